@@ -287,13 +287,13 @@ TEST(InstalledLibraryTest, AUserProgramLinksTheLibraryAndGetsTheSameBitsAsSolve)
 TEST(InstalledLibraryTest, PkgConfigFindsTheLibraryWithoutDependencies) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
-  const auto asked = run_tool(
+  const auto flags = run_tool(
       folder, "sh",
       {"-c", "PKG_CONFIG_PATH=$(dirname \"$(find '" + prefix +
                  "' -name oblique.pc)\") && export PKG_CONFIG_PATH && "
                  "pkg-config --cflags --libs oblique && pkg-config --print-requires oblique"});
-  EXPECT_EQ(asked.exit_code, 0) << asked.err;
-  EXPECT_THAT(asked.out, AllOf(HasSubstr("used\\ here"), HasSubstr("-loblique"),
+  EXPECT_EQ(flags.exit_code, 0) << flags.err;
+  EXPECT_THAT(flags.out, AllOf(HasSubstr("used\\ here"), HasSubstr("-loblique"),
                                Not(HasSubstr("made")), ::testing::EndsWith("-loblique \n")));
 }
 

@@ -30,7 +30,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 /// Results in one message of a real worker.
-constexpr std::uint64_t kResultsATurn = 1000;
+constexpr std::uint64_t kResultsPerTurn = 1000;
 /// Real workers report at this interval while they solve a batch.
 constexpr double kReportInterval_s = 0.1;
 
@@ -168,11 +168,11 @@ class LoadGenerator::Parts {
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
     // At most one message, so that other workers get their turn.
-    std::uint64_t solved = std::min<std::uint64_t>(left, kResultsATurn);
+    std::uint64_t solved = std::min<std::uint64_t>(left, kResultsPerTurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {
       solved = std::min(solved, static_cast<std::uint64_t>(elapsed_s / settings_.point_s));
-      if (solved < std::min(left, kResultsATurn) &&
+      if (solved < std::min(left, kResultsPerTurn) &&
           (elapsed_s < kReportInterval_s || solved == 0)) {
         return false;
       }

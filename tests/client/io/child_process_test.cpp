@@ -70,8 +70,8 @@ TEST(ChildProcess, InheritsTheGivenDescriptors) {
   input.write.close();
   child.wait();
   std::array<char, 16> bytes{};
-  const auto got = read(pipe.read.number(), bytes.data(), bytes.size());
-  EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(got)), "hello\n");
+  const auto length = read(pipe.read.number(), bytes.data(), bytes.size());
+  EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(length)), "hello\n");
 }
 
 TEST(ChildProcess, ReadsItsInputAndEndsWithTheProcessGroupOfItsParent) {

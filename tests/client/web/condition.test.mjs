@@ -13,7 +13,7 @@ const hasSelected = (page, condition) =>
     condition,
   );
 
-test("cells that do not meet the filter are greyed and counted, and the filter is in table, address and commands", async () => {
+test("cells outside the filter are grey and counted, and table, address and commands contain the filter", async () => {
   const page = await web.study("#/study/1?at=e@2");
   const before = await imageOf(page);
   await web.write(page, web.whereField, "mu > 1 AND e = 1");
@@ -40,7 +40,7 @@ test("errors in a condition appear beside its field", async () => {
   await page.close();
 });
 
-test("a rectangle over a map selects its points in table and other pictures; the selection becomes the filter; Back undoes both", async () => {
+test("a rectangle over a map selects its points in the table and in other pictures; the selection can become the filter; Back undoes both", async () => {
   const page = await web.study("#/study/1?at=e@2&drag=select");
   const before = await imageOf(page);
   await web.drag(page, web.mapCanvas, [0.3, 0.3], [0.6, 0.9]);
@@ -90,7 +90,7 @@ test("Escape clears the selection, and Shift makes dragging select instead of zo
   }
 });
 
-test("lines show a selection made elsewhere, and keys read their values", async () => {
+test("lines show a selection made in another picture, and keys read their values", async () => {
   const page = await web.study("#/study/1?pic=lines&x=mu&y=H&at=e@2&mark=fn_peak_N>4000");
   await hasSelected(page, "fn_peak_N>4000");
   await page.focus(".plot[role=application]");
@@ -106,7 +106,7 @@ test("lines show a selection made elsewhere, and keys read their values", async 
   await page.close();
 });
 
-test("few points are drawn one by one, and chosen by pointing at them; many are grouped in bins, and the page says so", async () => {
+test("few points are drawn one by one and can be clicked; many are grouped in bins, and the page says so", async () => {
   const page = await web.study(`#/study/${web.studies.scattered}?x=mu&y=fn_peak_N&z=H`);
   await web.facts(page, /^300 points, drawn one by one/);
   const id = web.studies.scattered;

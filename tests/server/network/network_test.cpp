@@ -66,10 +66,10 @@ class NetworkTest : public testing::Test {
   Incoming next(Network::Port port) {
     std::optional<Incoming> incoming;
     network_.collect(now_ms_);
-    run_until([&] { return (incoming = network_.next(port, anybody)).has_value(); });
+    run_until([&] { return (incoming = network_.next(port, any_identity)).has_value(); });
     return incoming ? std::move(*incoming) : Incoming{};
   }
-  static bool anybody(const std::string&) { return true; }
+  static bool any_identity(const std::string&) { return true; }
   std::uint64_t refused(RefusalCause cause) const {
     return network_.refusals().at(static_cast<std::size_t>(cause));
   }
@@ -179,7 +179,7 @@ TEST_F(NetworkTest, APeerIsNotReadUntilItsLastMessageIsTaken) {
   }
   EXPECT_LT(sent, 64U << 20U);
   EXPECT_EQ(network_.next(open_, [](const std::string&) { return false; }), std::nullopt);
-  EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
+  EXPECT_EQ(network_.next(keyed_, any_identity), std::nullopt);
 }
 
 TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndTheDisconnectIsReportedOnce) {
@@ -251,7 +251,7 @@ TEST_F(PausingNetworkTest, PeersThatSendTooFastAreNotReadAndLoseNothing) {
   std::size_t taken = 0;
   run_until([&] {
     update_most();
-    taken += network_.next(open_, anybody) ? 1U : 0U;
+    taken += network_.next(open_, any_identity) ? 1U : 0U;
     return taken == peers.size();
   });
   EXPECT_TRUE(network_.take_disconnects().empty());
@@ -418,7 +418,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   modest->tcp.send(first + modest->curve.sealed("second"));
   std::vector<std::string> bodies;
   run_until([&] {
-    while (const auto incoming = network_.next(keyed_, anybody)) {
+    while (const auto incoming = network_.next(keyed_, any_identity)) {
       bodies.push_back(incoming->body);
       EXPECT_TRUE(network_.has_more());  // most messages of the flood still wait
     }
@@ -449,7 +449,7 @@ TEST_F(NetworkTest, ForgedFramesEndTheirConnectionAndTheNextPeerIsServed) {
   forging->tcp.send(forged + forged);
   expect_message(*modest);
   run_until([&] {
-    EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
+    EXPECT_EQ(network_.next(keyed_, any_identity), std::nullopt);
     return network_.connections() == 1;
   });
 }
@@ -464,7 +464,7 @@ class ManyPeersTest : public NetworkTest {
   std::vector<std::unique_ptr<KeyedPeer>> peers_ = keyed_peers(300);
 };
 
-TEST_F(ManyPeersTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
+TEST_F(ManyPeersTest, AllOfManySlowPeersAreAdmitted) {
   for (const auto& peer : peers_) {
     peer->say_hello();
   }
@@ -646,7 +646,7 @@ TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAndDropsItsMessages) {
   authenticator_.revoke(worker_.public_key);
   network_.admission_changed();
   EXPECT_EQ(network_.connections(), 1U);
-  EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
+  EXPECT_EQ(network_.next(keyed_, any_identity), std::nullopt);
   EXPECT_EQ(refused(RefusalCause::kRevokedKey), 1U);
   const auto disconnects = network_.take_disconnects();
   ASSERT_EQ(disconnects.size(), 1U);

@@ -172,7 +172,7 @@ class QueryPoolTest : public testing::Test {
 TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledDuringItsStartRunsNoQuery) {
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe2(ends.data(), O_CLOEXEC), 0);
-  const protocol::Descriptor theirs(ends[1]);
+  const protocol::Descriptor reader_end(ends[1]);
   close(ends[0]);
   const protocol::Descriptor request(memfd_create("query", MFD_CLOEXEC));
   protocol::QueryRequest query;
@@ -180,7 +180,7 @@ TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledDuringItsStartRunsNoQuery) {
   ASSERT_TRUE(query.SerializeToFileDescriptor(request.number()));
   ASSERT_EQ(lseek(request.number(), 0, SEEK_SET), 0);
   const pid_t pid =
-      start_reader(settings_.reader_program, path_, request.number(), theirs.number());
+      start_reader(settings_.reader_program, path_, request.number(), reader_end.number());
   int status = -1;
   EXPECT_EQ(waitpid(pid, &status, 0), pid);
   EXPECT_EQ(status, 0);

@@ -36,7 +36,7 @@ class ServiceReuseTest : public ServiceTest {
     return message;
   }
   /// Returns the submission of `reusing` with ten more points.
-  ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
+  ClientRequest grown_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
     return message;
@@ -130,15 +130,15 @@ TEST_F(ServiceReuseTest, ALookupIsCutShortAfterAMillionProbesOrALongTimeWithoutA
   for (const bool is_long : {false, true}) {
     start({});
     submit_study();
-    const auto vain_part = [&](std::uint64_t next) {
+    const auto part_without_result = [&](std::uint64_t next) {
       now_.steady_ms += is_long ? StudyChanges::kLongestInVain_ms / 2 : 0;
       write_part({{}, {}, is_long ? 1 : StudyChanges::kMaxProbesInVain / 2, next});
     };
-    vain_part(1);
+    part_without_result(1);
     write_part(copies_of_a(IntervalSet(0, 1), 2));  // restarts both limits
-    vain_part(3);
+    part_without_result(3);
     EXPECT_THAT(parts(), ElementsAre(3));
-    vain_part(4);
+    part_without_result(4);
     EXPECT_EQ(ended(), kStudy);
     write_all();
     EXPECT_TRUE(last_reply().submit().reused().cut_short());
@@ -160,7 +160,7 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
   write_all();
   write_part({});
   write_all();
-  request(longer("b", 7));
+  request(grown_request("b", 7));
   write_all();
   EXPECT_THAT(parts(), ElementsAre(0));
   write_part({});
@@ -170,7 +170,7 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
 
 TEST_F(ServiceReuseTest, AStudyDoesNotGrowDuringItsLookup) {
   submit_study();
-  request(longer("b"));
+  request(grown_request("b"));
   EXPECT_THAT(last_error(), HasSubstr("cannot grow while results"));
 }
 

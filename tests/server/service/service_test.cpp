@@ -73,9 +73,9 @@ TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
 }
 
 TEST_F(ServiceTest, InvalidStudiesAreRefusedWithTheReason) {
-  const auto error_of = [&](const auto& spoil) {
+  const auto error_of = [&](const auto& make_invalid) {
     ClientRequest message = submit_request("a");
-    spoil(*message.mutable_submit());
+    make_invalid(*message.mutable_submit());
     request(message);
     return last_error();
   };

@@ -47,12 +47,12 @@ class KeysTest : public ::testing::Test {
     return std::make_unique<Worker>(folder_, server_->worker_url(),
                                     std::vector<std::string>{"--threads", "1", "--keys", key_file});
   }
-  static void wait_until_said(const Process& process, const std::string& words) {
+  static void wait_until_printed(const Process& process, const std::string& words) {
     wait_until("the message " + words,
                [&] { return process.err().find(words) != std::string::npos; });
   }
   /// Expects that a client with `key_file` is refused and prints a message with `words`.
-  void expect_turned_away(const std::string& key_file, const std::string& words) const {
+  void expect_refused_peer(const std::string& key_file, const std::string& words) const {
     const Outcome outcome = run_client({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
     EXPECT_THAT(outcome.err, HasSubstr(words));
@@ -85,18 +85,18 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
 }
 
 TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
-  expect_turned_away("", "requires a key, and none was given");
-  expect_turned_away(key("worker"), "it is for workers, and this port is for clients");
+  expect_refused_peer("", "requires a key, and none was given");
+  expect_refused_peer(key("worker"), "it is for workers, and this port is for clients");
   const std::string others = folder_.file("others");
   ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
-  expect_turned_away(others + "/client.key", "the server's public key in that file is wrong");
+  expect_refused_peer(others + "/client.key", "the server's public key in that file is wrong");
   ASSERT_EQ(change_keys({"add", "gone", "--role", "client"}).exit_code, 0);
-  wait_until_said(server_->process(), "new: gone");
+  wait_until_printed(server_->process(), "new: gone");
   ASSERT_EQ(change_keys({"revoke", "gone"}).exit_code, 0);
-  wait_until_said(server_->process(), "revoked: gone");
-  expect_turned_away(key("gone"), "not in the server's list");
-  wait_until_said(server_->process(), "has the role worker, but this port is for clients");
-  wait_until_said(server_->process(), "another public key of the server");
+  wait_until_printed(server_->process(), "revoked: gone");
+  expect_refused_peer(key("gone"), "not in the server's list");
+  wait_until_printed(server_->process(), "has the role worker, but this port is for clients");
+  wait_until_printed(server_->process(), "another public key of the server");
   const Outcome seen = run_client({"workers"}, key("reader"));
   EXPECT_THAT(seen.err, AllOf(HasSubstr("refused since the server started: "),
                               HasSubstr("key of another role (1)")));
@@ -111,7 +111,7 @@ TEST_F(KeysTest, AValidKeyAtTheWrongPortIsRefusedWithAHint) {
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("or this is not its port for clients (by default 7600)"),
                                  HasSubstr(key("client"))));
   const Worker worker(folder_, server_->client_url(), {"--keys", key("worker")});
-  wait_until_said(worker, "or this is not its port for workers (by default 7601)");
+  wait_until_printed(worker, "or this is not its port for workers (by default 7601)");
 }
 
 TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwnKey) {
@@ -138,15 +138,16 @@ TEST_F(KeysTest, AServerWithoutKeysIsReportedToPeersWithKeys) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("has no keys"));
   const Worker worker(folder_, open.worker_url(), {"--keys", key("worker")});
-  wait_until_said(worker, "has no keys");
+  wait_until_printed(worker, "has no keys");
 }
 
 TEST_F(KeysTest, ARefusedWorkerReportsTheReasonAndRetriesSlowly) {
   const auto client = worker_with(key("client"));
-  wait_until_said(*client, "it is for clients, and this port is for workers: trying again in 2 s");
+  wait_until_printed(*client,
+                     "it is for clients, and this port is for workers: trying again in 2 s");
   const Worker keyless(folder_, server_->worker_url());
-  wait_until_said(keyless, "requires a key, and none was given");
-  wait_until_said(*client, "trying again in 4 s");
+  wait_until_printed(keyless, "requires a key, and none was given");
+  wait_until_printed(*client, "trying again in 4 s");
 }
 
 TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
@@ -157,7 +158,7 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
   EXPECT_THAT(change_keys({"list"}).out, Not(HasSubstr("late")));
   const auto worker = worker_with(key("late"));
-  wait_until_said(*worker, "did not accept this key");
+  wait_until_printed(*worker, "did not accept this key");
   // `keys add --public` adds the public key of the file `late` to the list again.
   std::string line;
   std::ifstream file(key("late"));
@@ -165,9 +166,9 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   }
   const std::string public_key = line.substr(10, 40);
   ASSERT_EQ(change_keys({"add", "late", "--role", "worker", "--public", public_key}).exit_code, 0);
-  wait_until_said(*worker, "welcomed as worker");
+  wait_until_printed(*worker, "welcomed as worker");
   ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
-  wait_until_said(server_->process(), "revoked: late");
+  wait_until_printed(server_->process(), "revoked: late");
   wait_until("the worker reports the refusal", [&] {
     const std::string output = worker->err();
     return output.find("did not accept this key", output.find("welcomed as worker")) !=
@@ -179,7 +180,7 @@ TEST_F(KeysTest, AWatchingClientReportsThatItsKeyIsRevoked) {
   ASSERT_EQ(run_client(kFewPoints, key("client")).exit_code, 0);
   Process watching(folder_, client_program(),
                    {"watch", "few", "--server", server_->client_url(), "--keys", key("reader")});
-  wait_until_said(watching, "waits for a worker");
+  wait_until_printed(watching, "waits for a worker");
   ASSERT_EQ(change_keys({"revoke", "reader"}).exit_code, 0);
   EXPECT_EQ(watching.wait(), 1);
   EXPECT_THAT(watching.err(), HasSubstr("is not in the server's list"));
