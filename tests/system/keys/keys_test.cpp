@@ -52,7 +52,7 @@ class KeysTest : public ::testing::Test {
                [&] { return process.err().find(words) != std::string::npos; });
   }
   /// Expects that a client with `key_file` is refused and prints a message with `words`.
-  void expect_refused_peer(const std::string& key_file, const std::string& words) const {
+  void expect_client_error(const std::string& key_file, const std::string& words) const {
     const Outcome outcome = run_client({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
     EXPECT_THAT(outcome.err, HasSubstr(words));
@@ -85,16 +85,16 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
 }
 
 TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
-  expect_refused_peer("", "requires a key, and none was given");
-  expect_refused_peer(key("worker"), "it is for workers, and this port is for clients");
+  expect_client_error("", "requires a key, and none was given");
+  expect_client_error(key("worker"), "it is for workers, and this port is for clients");
   const std::string others = folder_.file("others");
   ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
-  expect_refused_peer(others + "/client.key", "the server's public key in that file is wrong");
+  expect_client_error(others + "/client.key", "the server's public key in that file is wrong");
   ASSERT_EQ(change_keys({"add", "gone", "--role", "client"}).exit_code, 0);
   wait_until_printed(server_->process(), "new: gone");
   ASSERT_EQ(change_keys({"revoke", "gone"}).exit_code, 0);
   wait_until_printed(server_->process(), "revoked: gone");
-  expect_refused_peer(key("gone"), "not in the server's list");
+  expect_client_error(key("gone"), "not in the server's list");
   wait_until_printed(server_->process(), "has the role worker, but this port is for clients");
   wait_until_printed(server_->process(), "another public key of the server");
   const Outcome seen = run_client({"workers"}, key("reader"));
