@@ -44,7 +44,8 @@ StoredStudy study_in(const Statement& row) {
   return study;
 }
 
-/// Throws StorageError if a study was changed so that its rows may belong to other points.
+/// Throws StorageError if another program changed a study, because its rows may belong to other
+/// points now.
 void check_studies(sqlite3* database) {
   Statement wrong(database, fmt::format("SELECT study_id, name FROM studies WHERE checksum <> {}",
                                         kStudyChecksum));
@@ -59,10 +60,10 @@ void check_studies(sqlite3* database) {
   }
 }
 
-/// Why this version refuses the study, or an empty text. Throws StorageError for a recipe that
+/// Returns why this version refuses the study, or an empty text. Throws StorageError if the recipe
 /// cannot be read.
 std::string study_error(const StoredStudy& study) {
-  if (!protocol::is_utf8(study.name)) {  // messages must be UTF-8
+  if (!protocol::is_utf8(study.name)) {  // the name is part of messages, which must be UTF-8
     return "its name is not UTF-8: rename it with sqlite3 while no server runs";
   }
   try {
