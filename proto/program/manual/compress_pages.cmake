@@ -1,4 +1,5 @@
-# Run by cpack: compresses manual pages, without times or names in the result.
+# Compresses the manual pages when cpack runs it. The results contain no times or names, so that
+# they are reproducible.
 find_program(GZIP gzip REQUIRED)
 file(GLOB found "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/share/man/man1/*.1"
      "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/*/usr/share/man/man1/*.1")
