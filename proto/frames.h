@@ -15,8 +15,8 @@ inline constexpr std::uint32_t kProtocolVersion = 8;
 /// Maximum size of a frame that the server or a peer accepts [bytes].
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;
 
-/// Returns why the server refuses a peer of this protocol version, or an empty text. `who` is
-/// "worker" or "client".
+/// Returns why the server refuses a peer of this version, or an empty text. `who` is "worker" or
+/// "client".
 std::string version_error(std::uint32_t version, const std::string& who);
 
 /// Encodes a message as one frame.

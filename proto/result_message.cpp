@@ -24,8 +24,7 @@ using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
 constexpr std::size_t kLongestText = 65536;
 
-/// Returns the value that stands for a missing scalar, because scalars are sent by type. No result
-/// can have it.
+/// Returns the value that stands for a missing scalar of type T. No result can have it.
 template <class T>
 T absent() {
   if constexpr (std::is_same_v<T, double>) {
@@ -63,7 +62,7 @@ void read_scalars(const Values& values, CaseResult& result) {
   });
 }
 
-/// How a list of solver::result_lists() is sent: some members of each element, one element after
+/// How a list of solver::result_lists() is sent: members of each element, one element after
 /// another.
 struct SentList {
   const Numbers& (PointResult::*numbers)() const;

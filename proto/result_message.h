@@ -38,19 +38,17 @@ PointResult failed_point(std::uint64_t point, const std::string& reason);
 /// finite or exceeds kLargestOutput, has lists of impossible length, or is too large.
 std::string fault_of(const PointResult& message);
 
-/// Maximum size of the rows of a trace [bytes]. Together with its result and the model it fits into
-/// one frame.
+/// Maximum size of the rows of a trace [bytes]. With its result and model it fits into one frame.
 inline constexpr std::size_t kMaxTraceBytes =
     kMaxFrameBytes - kMaxResultBytes - (std::size_t{64} << 10U);
 
-/// Returns why a received trace is invalid, or an empty text. `shape` and `with_fall` are values of
-/// the request.
+/// Returns why a received trace is invalid, or an empty text. `shape` and `with_fall` are as
+/// requested.
 std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, bool with_fall);
 
 void set_protocol(WorkerHello& hello);
 
-/// Returns the names of the scalars that this build sends and expects, in order, separated by
-/// spaces.
+/// Returns the names of the scalars that this build sends and expects, separated by spaces.
 std::string sent_outputs();
 
 /// Returns why the server refuses the worker, or an empty text. The worker may have another
@@ -62,8 +60,7 @@ inline std::uint64_t completed_points(const StudyStatus& study) {
   return study.solved() + study.failed() + study.left_out();
 }
 
-/// Returns the number of points that are not completed. The filter may still leave out some of
-/// them.
+/// Returns the number of points that are not completed. A filter may still leave out some of them.
 inline std::uint64_t open_points(const StudyStatus& study) {
   return study.points() - completed_points(study);
 }

@@ -27,8 +27,7 @@ bool is_utf8(std::string_view text);
 /// Returns the first characters of a UTF-8 text, at most `bytes` bytes in all.
 std::string shortened(const std::string& text, std::size_t bytes);
 
-/// Returns at most `bytes` bytes of visible(text), for an error message. If the text was cut, "..."
-/// follows.
+/// Returns at most `bytes` bytes of visible(text), for an error message, and "..." if it was cut.
 std::string excerpt(std::string_view text, std::size_t bytes = 80);
 
 /// Returns the parts of `text` between separators. Parts may be empty.

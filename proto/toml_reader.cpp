@@ -14,8 +14,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// Returns a value as written in the file. In a list or table, nested lists and tables are shown
-/// only by their kind.
+/// Returns a value as written in the file. Nested lists and tables are shown only by their kind.
 std::string element(const toml::node& node, bool is_nested) {
   std::vector<std::string> parts;
   if (is_nested && (node.is_array() || node.is_table())) {

@@ -53,8 +53,8 @@ class TomlReader {
     }
   }
 
-  // Return the value of a node. Throw if it has another type. `key` and `expected` are for the
-  // error message.
+  // Return the value of a node; throw if it has another type. Messages contain `key` and
+  // `expected`.
   double number(std::string_view key, const toml::node& node, std::string_view expected) const;
   std::string text(std::string_view key, const toml::node& node, std::string_view expected) const;
   bool boolean(std::string_view key, const toml::node& node) const;

@@ -200,8 +200,7 @@ Descriptor opened_folder_of(const std::string& path) {
   return opened;
 }
 
-/// Writes a new file of mode 0600, and syncs the file and its folder. Deletes the file if that
-/// fails.
+/// Writes a new file of mode 0600, and syncs it and its folder. Deletes the file if that fails.
 void write_new_file(const std::string& path, std::string_view text) {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnersAlone));
@@ -378,8 +377,7 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
 
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change) {
-  // If the path is a symbolic link, replaces its target, because other links may point to the
-  // target.
+  // Replaces the target of a symbolic link, because other links may point to the target.
   const std::string target = std::filesystem::weakly_canonical(path);
   const Descriptor folder = opened_folder_of(target);
   if (::flock(folder.number(), LOCK_EX) != 0) {
@@ -391,8 +389,7 @@ void change_authorized_keys(const std::string& path,
   const std::string draft = target + ".new";
   ::unlink(draft.c_str());  // a process that was killed may have left it
   write_new_file(draft, text_of(keys));
-  // Keeps owner and mode, because a server that runs as another user must still be able to read the
-  // file.
+  // Keeps owner and mode, because a server of another user must still be able to read the file.
   const bool has_owner_and_mode =
       before.st_mode == 0 || (::chown(draft.c_str(), before.st_uid, before.st_gid) == 0 &&
                               ::chmod(draft.c_str(), before.st_mode & 07777U) == 0);

@@ -69,12 +69,10 @@ struct KeyFile {
   std::string path = {};  ///< path of the file that was read
 };
 
-/// Reads a key file. Throws solver::InputError if the file is incomplete, or if other users can
-/// read it (README.md).
+/// Throws solver::InputError if the file is incomplete, or if other users can read it (README.md).
 KeyFile read_key_file(const std::string& path);
 
-/// Writes a new file of mode 0600 and syncs it. Throws std::runtime_error if that fails or the file
-/// exists.
+/// Writes a new file of mode 0600 and syncs it. Throws std::runtime_error, also if the file exists.
 void write_key_file(const std::string& path, const KeyFile& key);
 
 /// Returns whether a key and its file may have this name.

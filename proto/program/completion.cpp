@@ -113,8 +113,8 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
   return offers;
 }
 
-/// Returns the cases of a command and its subcommands. `path` is the command as typed, without the
-/// program.
+/// Returns the cases of a command and its subcommands. `path` is the command as typed after
+/// PROGRAM.
 std::string cases_of(CLI::App& command, const std::string& path, const ValueWords& words) {
   std::string cases;
   std::string offers;

@@ -78,8 +78,7 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
   std::vector<std::string_view> commands;
   std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(commands),
                [](std::string_view word) { return !word.starts_with("-"); });
-  // Reports an unknown word rather than a missing command or flag, because the word may be a
-  // misspelling of it.
+  // Reports an unknown word first, because it may be a misspelling of a missing command or flag.
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_command = !commands.empty() && !first.starts_with("-");

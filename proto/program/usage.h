@@ -49,8 +49,7 @@ int report_wrong_usage(const std::string& words, const std::string& message);
 /// end: 0 after --help and --version, kWrongUsage after printing an error.
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv);
 
-/// Words that complete a value. The key is the name of the option ("--x") or of its value type
-/// ("COLUMNS").
+/// Words that complete a value, by name of the option ("--x") or of its value type ("COLUMNS").
 using ValueWords = std::map<std::string, std::vector<std::string>>;
 
 /// If the command line is `PROGRAM completion bash|zsh`, prints the completion script of `app` and

@@ -293,8 +293,7 @@ void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
           twice == values.end() ? 0.0 : *twice);
 }
 
-/// Returns whether the key takes only whole numbers. The key must take `from` and values up to
-/// `to`.
+/// Returns whether the key takes only whole numbers. It must take `from` and values up to `to`.
 bool takes_whole_numbers(const ParameterKey& key, double from, double to) {
   return !key.is_allowed(from + std::min(0.25, 0.5 * (to - from)));
 }
@@ -316,16 +315,14 @@ void check_range(const ParameterKey& key, const Axis& axis) {
   const RangeValues values(axis);
   if (axis.spacing() == SPACING_LOGARITHMIC) {
     check_positive(key, axis.from());
-    // Whole numbers with a constant ratio are rare, so the loop soon finds a value that is not
-    // allowed.
+    // Whole numbers with a constant ratio are rare, so the loop soon finds a wrong value.
     const bool takes_whole = takes_whole_numbers(key, axis.from(), axis.to());
     for (std::uint64_t i = 0; takes_whole && i < axis.count(); ++i) {
       solver::check_value(key, values.at(i));
     }
     return;
   }
-  // A key allows all numbers of an interval, or only whole numbers. If the second value is allowed,
-  // all values are.
+  // A key allows an interval, or only its whole numbers. If the second value is allowed, all are.
   solver::check_value(key, values.at(std::min<std::uint64_t>(1, axis.count() - 1)));
 }
 

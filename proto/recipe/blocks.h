@@ -88,8 +88,7 @@ BlockKind block_kind(const Block& block);
 std::span<const Axis* const> model_axes(const Block& block);
 std::span<const Axis* const> point_axes(const Block& block);
 
-/// Returns whether values of an axis are drawn in a sample: it has a distribution or several
-/// values.
+/// Returns whether values of an axis are drawn: it has a distribution or several values.
 bool is_drawn(const Axis& axis);
 
 /// Returns the number of points of a checked block, including points that its filter leaves out.
@@ -131,8 +130,7 @@ void check_ends(const solver::ParameterKey& key, double from, double to);
 /// on the point it is not checked (`needs_point_validation`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
-/// Returns whether any values, or H against the finger's length, can only be checked point by
-/// point.
+/// Returns whether values, or H against the finger's length, can only be checked point by point.
 bool needs_point_validation(const solver::ModelParameters& model, const Block& block);
 
 /// Makes a block from axes with known keys, and sorts them: model keys as in listings, H, mu and e.

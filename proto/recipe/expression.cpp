@@ -20,8 +20,7 @@ using solver::InputError;
 constexpr std::size_t kLongestQuoted = 40;
 constexpr const char* kComma = "`,` is allowed only between the arguments of a function";
 
-/// Returns the value of a condition: NaN if `x` contains NaN, because an undefined condition must
-/// not count as false.
+/// Returns NaN if `x` contains NaN, because an undefined condition must not count as false.
 double truth(const double* x, bool value) {
   return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
                                               : static_cast<double>(value);

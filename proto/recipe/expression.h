@@ -26,8 +26,8 @@ class Expression {
   using MeaningOf = std::function<std::variant<std::size_t, double>(std::string_view name)>;
   Expression(std::string_view text, const MeaningOf& meaning_of);
 
-  /// Returns the value, which may be NaN or infinite. A comparison gives 1 or 0, or NaN if one side
-  /// is NaN.
+  /// Returns the value, which may be NaN or infinite. A comparison is 1 or 0, or NaN if a side is
+  /// NaN.
   double value_at(std::span<const double> values) const;
 
  private:

@@ -44,8 +44,7 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-/// Maximum size of a recipe [bytes]. Together with other fields it must fit into a frame for a
-/// worker.
+/// Maximum size of a recipe [bytes]. It must fit into a frame for a worker, with other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
 std::string comparable_bytes(Block block) {
@@ -201,8 +200,8 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
                     key.name, exact_number(step), kMaxPoints));
   }
   const double whole_steps = std::round(steps);
-  // Steps in decimals are not exact in binary. This tolerance, relative to a step, is well above
-  // their rounding errors.
+  // Steps in decimals are not exact in binary. This relative tolerance is well above rounding
+  // errors.
   const double tolerance = 1e-9 * std::max(1.0, steps);
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;

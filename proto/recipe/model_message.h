@@ -12,8 +12,7 @@
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/parameters.h"
 
-// Converts models and recipes between structs, messages, texts and digests, and makes them from
-// study files and flags.
+// Converts models and recipes between structs, messages, texts, digests, study files and flags.
 namespace oblique::protocol {
 
 ModelParameters to_message(const solver::ModelParameters& model);
@@ -33,8 +32,7 @@ std::string canonical_model(const solver::ModelParameters& model);
 /// Returns whether two blocks have the same axes, zip, sample and filter, as they are written.
 bool is_same_block(const Block& a, const Block& b);
 
-/// Returns the SHA-256, in hexadecimal digits, of the model, the request for estimated errors and
-/// the blocks.
+/// Returns the SHA-256, in hexadecimal digits, of model, request for estimated errors and blocks.
 std::string recipe_digest(const Recipe& recipe);
 
 /// Throws solver::InputError if the recipe does not fit into a frame for a worker.

@@ -53,8 +53,7 @@ auto in_expression(std::string_view key, std::string_view text, Work work) {
   }
 }
 
-/// Calls `act`. If that throws an InputError and the recipe has several blocks, adds the block's
-/// number.
+/// Calls `act`. Adds the block's number to an InputError if the recipe has several blocks.
 template <typename Act>
 void in_block(const Recipe& recipe, std::size_t number, Act act) {
   try {
@@ -115,8 +114,7 @@ class PointTable::BlockPoints : public BlockPlace {
   const Block& definition() const { return *block_; }
   std::uint64_t points_per_model() const { return points / models; }
 
-  /// Returns the values of a point in the order of the axes. The functions below take them as their
-  /// argument.
+  /// Returns the values of a point in the order of the axes, which the functions below need.
   std::vector<double> values_at(std::uint64_t point) const {
     std::vector<double> values(sources_.size());
     for (std::size_t i = 0; i < sources_.size(); ++i) {
@@ -520,8 +518,7 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table) 
                          value, expected);
     }
   }
-  // A result without a model was solved while the study had a single model. The study may have
-  // grown since then.
+  // A result without a model was solved before the study grew and got several models.
   bool has_model = !result.has_model() && own.model == 0;
   try {
     has_model = has_model || (result.has_model() && is_close(from_message_unchecked(result.model()),
@@ -563,8 +560,8 @@ PassingPoints passing_points(const PointTable& table, int block) {
       !is_counted};
 }
 
-/// Returns the points that pass the filters. For large studies returns at most `kSampledPoints`
-/// random ones.
+/// Returns the points that pass the filters; for large studies at most `kSampledPoints` random
+/// ones.
 std::vector<std::uint64_t> some_points(const PointTable& table) {
   constexpr std::uint64_t kTries = 100 * kSampledPoints;
   const std::uint64_t most = table.size() <= kMaxCounted ? kMaxCounted : kSampledPoints;

@@ -78,8 +78,7 @@ class PointTable {
   void validate_points() const;
   static constexpr std::uint64_t kMaxValidated = 100'000;
 
-  /// Returns a sentence with the values if the point cannot be solved or its filter is NaN; else an
-  /// empty text.
+  /// Returns a sentence if the point cannot be solved or its filter is NaN; else an empty text.
   std::string fault(std::uint64_t index) const;
 
   // The functions below throw std::out_of_range if the study has no such point, model or block.
@@ -88,8 +87,8 @@ class PointTable {
   /// allowed by the base model's value.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
-  /// Returns the values of a point in the order of its block's axes. Values of expressions may be
-  /// outside the domain.
+  /// Returns a point's values in the order of its block's axes. Expressions may be outside the
+  /// domain.
   std::vector<double> values(std::uint64_t index) const;
   /// Returns the longest run of consecutive points around `index` that have the same model.
   /// Adjacent blocks without model axes are one run.

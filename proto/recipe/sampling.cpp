@@ -38,8 +38,7 @@ std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   return (high << low_bits) | low;
 }
 
-/// Returns the image of `i` < `n` under the permutation of 0 ... n-1 that `key` selects. Needs no
-/// list.
+/// Returns the image of `i` < `n` under the permutation of 0 ... n-1 that `key` selects.
 std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
   if (n < 2) {
     return 0;
@@ -159,14 +158,13 @@ double normal_quantile(double p) {
   if (p > 0.5) {
     return -normal_quantile(1.0 - p);
   }
-  // The start value is within 4.5e-4: M. Abramowitz and I. A. Stegun, Handbook of Mathematical
-  // Functions, 26.2.23.
+  // Start value, within 4.5e-4: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions,
+  // 26.2.23.
   const double t = std::sqrt(-2.0 * std::log(p));
   double z = (2.515517 + t * (0.802853 + t * 0.010328)) /
                  (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))) -
              t;
-  // Halley's method for Phi(z) = p, where Phi'' = -z Phi'. Each step raises the error to its third
-  // power.
+  // Halley's method for Phi(z) = p, where Phi'' = -z Phi'. Each step cubes the error.
   constexpr int kSteps = 3;
   for (int i = 0; i < kSteps; ++i) {
     const double density = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);

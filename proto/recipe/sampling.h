@@ -4,8 +4,7 @@
 
 #include "proto/oblique.pb.h"
 
-// Sample points in the unit cube, each computed from its number, and quantiles of the axes'
-// distributions.
+// Sample points in the unit cube, each computed from its number, and quantiles of distributions.
 namespace oblique::sampling {
 
 inline constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 44;
@@ -31,14 +30,13 @@ std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension);
 /// flipped, so every elementary interval of base 2 keeps its number of points.
 std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key);
 
-/// The quantiles of an axis with a checked distribution. A normal distribution is truncated at its
-/// ends if it has ends.
+/// The quantiles of a checked distribution. A normal distribution is truncated at the ends that it
+/// has.
 class Quantiles {
  public:
   explicit Quantiles(const protocol::Axis& axis);
 
-  /// Returns the quantile for 0 < fraction < 1. It increases with `fraction` and stays between the
-  /// ends.
+  /// Returns the quantile for 0 < fraction < 1. It rises with `fraction` and is between the ends.
   double value_at(double fraction) const;
 
   /// Returns the probability of the normal distribution between the ends; 1 for other kinds. A

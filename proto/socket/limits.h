@@ -13,8 +13,7 @@ struct KeepAlive {
   int unacknowledged_ms = 20'000;
 };
 
-/// Number of bytes that encryption (CURVE's MESSAGE) adds to each frame. The maximum frame size
-/// does not include them.
+/// Number of bytes that encryption (CURVE's MESSAGE) adds to each frame, besides the maximum size.
 inline constexpr int kSealBytes = 33;
 
 }  // namespace oblique::protocol

@@ -51,8 +51,7 @@ class SocketMonitor {
   /// Returns a ZeroMQ socket that becomes readable when the state may have changed.
   void* handle() { return events_.handle(); }
 
-  /// Returns the number of connections so far that have completed their handshake, including the
-  /// current one.
+  /// Returns the number of connections so far that have completed their handshake.
   std::uint64_t connections();
   /// Returns why the peer has rejected the socket, and the remedy, without a full stop. A rejected
   /// socket does not connect again; make a new one.

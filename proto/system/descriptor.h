@@ -46,8 +46,7 @@ class WakeUp {
     }
   }
 
-  // Errors are ignored: if the counter is already full or empty, the descriptor has the right
-  // state.
+  // Ignores errors: if the counter is already full or empty, the descriptor has the right state.
   void wake() const { static_cast<void>(eventfd_write(descriptor(), 1)); }
   void clear() const {
     eventfd_t count = 0;

@@ -10,8 +10,7 @@
 
 #include "proto/oblique.pb.h"
 
-// Rows of an answer in chunks. A chunk is a QueryReply that contains the cells of its rows one
-// after another.
+// Rows of an answer in chunks. A chunk is a QueryReply; its cells follow each other, row by row.
 namespace oblique::protocol {
 
 /// Codes of the kinds of cells in QueryReply.cells.
@@ -46,8 +45,7 @@ class ChunkRows {
  public:
   explicit ChunkRows(const QueryReply& chunk);
 
-  /// Moves to the next row; the first call moves to the first row. Returns false after the last
-  /// row.
+  /// Moves to the next row, at the first call to the first row. Returns false after the last row.
   bool next();
   std::size_t columns() const { return cells_.size(); }
   /// Returns the value of a column in the current row.
@@ -75,8 +73,8 @@ class ChunkWriter {
   /// Returns the size of the cells that were added since the last `take` [bytes].
   std::uint64_t bytes() const { return cells_.size(); }
 
-  /// Returns the rows that were added since the last call. The caller must number the chunk and
-  /// mark the last one.
+  /// Returns the rows added since the last call. The caller must number the chunk and mark the last
+  /// one.
   QueryReply take();
 
  private:

@@ -9,8 +9,8 @@ namespace oblique::protocol {
 // Checks frames before they are parsed. A parsed message of two bytes may need hundreds of bytes,
 // so parsing a malicious frame could need a hundred times its size.
 
-/// Maximum size of a worker's frame [bytes], not counting the rows of a trace. Workers split their
-/// results at 1 MiB.
+/// Maximum size of a worker's frame [bytes], without a trace's rows. Workers split results at 1
+/// MiB.
 inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024;
 /// Maximum number of results in one message. Workers send at most 1,000.
 inline constexpr std::size_t kMaxResultsAMessage = 10'000;
@@ -19,8 +19,7 @@ inline constexpr std::size_t kMaxResultsAMessage = 10'000;
 /// bytes.
 inline constexpr int kMaxLeasesAHeartbeat = 65'536;
 
-/// Returns whether the frame is within the limits for workers. May return true for a frame that
-/// cannot be parsed.
+/// Returns whether the frame is within the limits for workers; may be true for an invalid frame.
 bool is_worker_frame_within_limits(std::string_view frame);
 
 /// Returns whether the recipe in a client's request has enough bytes for the axes that its blocks

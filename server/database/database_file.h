@@ -35,12 +35,11 @@ bool is_network_file_system(std::string_view type);
 /// machines could write at once and damage the file. `path` need not exist.
 std::string network_disk_error(const std::string& path);
 
-/// Returns `path`. Throws StorageError if it is on a network disk and `allows_network_disk` is
-/// false.
+/// Returns `path`. Throws StorageError for a network disk, unless `allows_network_disk`.
 const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk);
 
-/// Returns whether a server has the database at `path` open; false if the file cannot be opened.
-/// Takes no lock.
+/// Returns whether a server has the database open; false if the file cannot be opened. Takes no
+/// lock.
 bool is_in_use(const std::string& path);
 
 /// The database file of a server, locked against other servers. If the file is deleted, renamed or

@@ -93,8 +93,7 @@ class Statement {
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
   /// Returns the bytes of a text or blob.
   std::string text(int column) const { return std::string(bytes(column)); }
-  /// Returns the bytes of a text or blob without copying them. They are valid until the next call
-  /// of `step` or `reset`.
+  /// Returns the bytes without a copy. They are valid until the next call of `step` or `reset`.
   std::string_view bytes(int column) const;
 
  private:
@@ -107,8 +106,7 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
 
-/// Runs one statement that returns no rows, with the values bound to its parameters. Throws
-/// StorageError.
+/// Runs one statement that returns no rows, with the values bound. Throws StorageError.
 template <class... Values>
 void execute_with(sqlite3* database, std::string_view sql, const Values&... values) {
   Statement statement(database, sql);

@@ -29,8 +29,7 @@
 
 namespace oblique::server {
 
-/// A queue of functions that other threads want to run on the event loop's thread. A descriptor
-/// wakes the loop.
+/// A queue of functions to run on the event loop's thread. A descriptor wakes the loop.
 class CompletionQueue {
  public:
   using Completion = std::function<void()>;

@@ -79,8 +79,7 @@ class StudyCheck {
     study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
   }
 
-  /// Reports values that a server never stores, because they could prevent its start or its display
-  /// of the study.
+  /// Reports values that a server never stores, because they could prevent its start or a display.
   void check_terms() {
     constexpr std::int64_t kLongestTime = 64;
     for (const std::string& error :

@@ -13,8 +13,7 @@ struct Diagnosis {
   std::vector<std::string> remarks;  ///< unfinished studies, and checks that were not possible
 };
 
-/// Checks pages, indices and contents of the database at `path`. Throws StorageError if it is not a
-/// database of ours.
+/// Checks pages, indices and contents of a database. Throws StorageError if it is not one of ours.
 Diagnosis diagnose(const std::string& path);
 
 /// Returns the faults that SQLite finds in pages and indices of an open database, at most twenty.

@@ -21,8 +21,7 @@
 namespace oblique::server {
 namespace {
 
-/// Opens the copy of a source. Throws StorageError for tables with other columns and for damaged
-/// rows.
+/// Opens the copy of a source. Throws StorageError for other columns and for damaged rows.
 DatabaseHandle open_sound_source(const std::string& path) {
   // Maximum size of a stored value, which cannot be longer than the message that it was part of.
   constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
@@ -50,8 +49,7 @@ StudyRow study_in(const Statement& row) {
 
 // In the statements below, ?1 is the study's number in the source and ?2 its number in the target.
 
-/// Selects points that both databases have solved with different outputs. The solver's time is not
-/// compared.
+/// Selects points solved in both databases with different outputs, apart from the solver's time.
 std::string differing_sql() {
   const auto outputs = [](const char* table) {
     std::string names;
@@ -271,8 +269,7 @@ Merged Merger::merge(const std::string& source, const std::string& rename_prefix
       sqlite3_exec(database, "DETACH source", nullptr, nullptr, nullptr);
     };
     const std::unique_ptr<sqlite3, decltype(detach)> attached(target_.connection(), detach);
-    // Limits the memory of the transaction: SQLite writes changed pages beyond this cache to the
-    // log.
+    // Limits the memory of the transaction: SQLite writes pages beyond this cache to the log.
     execute(target_.connection(), "PRAGMA main.cache_size = -65536");
     target_.write([&] {
       SourceMerge(target_.connection(), opened.get(), rename_prefix, merged).run();

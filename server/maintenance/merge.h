@@ -46,8 +46,7 @@ class Merger {
   /// cannot be read or written and for damaged rows, and MergeRefused.
   Merged merge(const std::string& source, const std::string& rename_prefix = {});
 
-  /// Moves all changes from the log into the target's file. Returns false if a reader prevents
-  /// that.
+  /// Moves all changes from the log into the target's file. Returns false if a reader prevents it.
   bool finish() { return target_.merge_log(); }
 
  private:

@@ -16,8 +16,8 @@ class StudyRefused : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Renames a study. Throws StudyRefused if no study has this number, or if the name is not allowed
-/// or in use.
+/// Renames a study. Throws StudyRefused for an unknown number, or if the name is in use or not
+/// allowed.
 void rename_study(const std::string& path, std::uint64_t study_id, const std::string& name);
 
 /// Deletes a study with all its results. If the process is ended early, the study is gone, and the
@@ -25,8 +25,8 @@ void rename_study(const std::string& path, std::uint64_t study_id, const std::st
 /// that rows remain or the log was not merged. Throws StudyRefused if no study has this number.
 bool delete_study(const std::string& path, std::uint64_t study_id);
 
-/// Reads the recipe of a study. A server may use the database meanwhile. Throws StudyRefused if no
-/// study has this number.
+/// Reads a study's recipe; a server may use the database. Throws StudyRefused for an unknown
+/// number.
 protocol::Recipe stored_recipe(const std::string& path, std::uint64_t study_id);
 
 }  // namespace oblique::server

@@ -18,8 +18,7 @@ constexpr std::size_t kCookieTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kCookieBytes = kRandomNonceBytes + kMacBytes + kCookieTextBytes;
 constexpr std::size_t kWelcomeTextBytes = kKeyBytes + kCookieBytes;
 
-// Offsets and sizes of the parts of INITIATE, without the command's name, and of the text in its
-// box.
+// Offsets and sizes of the parts of INITIATE, without its name, and of the text in its box.
 constexpr std::size_t kInitiateBoxAt = kCookieBytes + kCounterBytes;
 constexpr std::size_t kVouchTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kVouchBytes = kRandomNonceBytes + kMacBytes + kVouchTextBytes;
@@ -130,8 +129,7 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
     return foreign;
   }
   std::memcpy(key_.data(), text.data(), kKeyBytes);
-  // Checks this before the list of keys, so that a forged INITIATE does not reveal which keys are
-  // listed.
+  // Checks this before the list of keys, so that a forged INITIATE does not reveal listed keys.
   if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, short_term_key,
                   own_short_term_secret)) {
     return Refusal{RefusalCause::kFaulty, "it does not hold the secret half of its key"};

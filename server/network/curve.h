@@ -85,8 +85,7 @@ class CurveSession {
   CurveSession(const Secret<kKeyBytes>& shared_key, std::uint64_t received_counter)
       : key_(shared_key), received_counter_(received_counter) {}
 
-  /// Returns the data of READY with these properties. Must be called once, before all other
-  /// functions.
+  /// Returns the data of READY with these properties. Must be called once, before the others.
   std::string ready(std::string_view properties);
   /// Appends a MESSAGE with this body to `out`.
   void seal(std::string_view body, std::string& out);
@@ -108,13 +107,12 @@ class CurveHandshake {
   /// `security` must outlive this object.
   explicit CurveHandshake(const PortSecurity& security) : security_(security) {}
 
-  /// The data of WELCOME after HELLO; the peer's properties after INITIATE; or the reason for a
-  /// refusal.
+  /// The data of WELCOME after HELLO, the peer's properties after INITIATE, or why it is refused.
   using Outcome = std::variant<std::string, Refusal>;
   /// Handles a command with this name and data. Takes about 0.1 ms.
   Outcome take(std::string_view command, std::string_view data);
   /// Returns whether the peer has proved that it holds an admitted key. The functions below need
-  /// that.
+  /// it.
   bool is_done() const { return session_.has_value(); }
   const std::shared_ptr<const KeyIdentity>& identity() const { return identity_; }
   const protocol::CurveKey& key() const { return key_; }

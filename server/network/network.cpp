@@ -29,8 +29,7 @@ constexpr std::size_t kFewestConnections = 16;
 constexpr std::size_t kReadBytes = 64 * 1024;
 constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
 
-// Limits on handshakes with keys. One step of such a handshake costs as much as hundreds of
-// messages.
+// Limits on handshakes with keys. A step of such a handshake costs as much as hundreds of messages.
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
 constexpr std::size_t kMaxPendingSteps = 64;
@@ -312,8 +311,7 @@ void Network::set_accepting(Port port, bool is_accepting) {
   epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
 }
 
-/// Ends a connection if another one would exceed a limit. Returns false if the new connection must
-/// be refused.
+/// Ends a connection if another would exceed a limit. Returns false if the new one must be refused.
 bool Network::make_room(Port port, const PeerAddress& address) {
   if (ports_[port].security && !make_room_at_source(address)) {
     return false;
@@ -424,8 +422,7 @@ void Network::run_handshakes() {
   }
 }
 
-/// Handles a finished handshake, and ends a connection that has a fault. Returns false if it ended
-/// the connection.
+/// Handles a finished handshake. Ends a connection that has a fault, and then returns false.
 bool Network::examine(Number number, Peer& peer) {
   const Zmtp& zmtp = peer.connection.zmtp();
   if (peer.is_in_handshake && zmtp.is_open()) {

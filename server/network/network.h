@@ -26,7 +26,7 @@ namespace oblique::server {
 struct NetworkLimits {
   std::size_t connections =
       limits::kConnections;  ///< maximum number at all ports; fewer if the system allows only fewer
-  /// Maximum total size of messages that are incomplete or not taken yet. A peer has at most one
+  /// Maximum total size of messages that are incomplete or not taken. A peer has at most one
   /// message.
   std::size_t held_in_bytes = limits::kHeldInBytes;
   /// If the messages of a port have more bytes than this and one of them waits, the port's peers

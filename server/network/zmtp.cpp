@@ -14,8 +14,8 @@ constexpr std::size_t kMechanismBytes = 20;
 constexpr std::size_t kAsServerAt = 32;
 constexpr unsigned char kMajorVersion = 3;
 constexpr std::size_t kLongestShortFrame = 255;
-/// Maximum size of a command. A normal READY has about 50 bytes and an INITIATE 300, plus up to 255
-/// for an identity.
+/// Maximum size of a command. READY has about 50 bytes; INITIATE 300, plus up to 255 for an
+/// identity.
 constexpr std::uint64_t kLongestCommand = 4096;
 constexpr const char* kCutOff = "its properties are cut off";
 

@@ -55,8 +55,7 @@ struct Options {
   oblique::protocol::LogSettings log;
 };
 
-/// Raises the limit on open descriptors, because each connection needs one and the default limit is
-/// low.
+/// Raises the limit on open descriptors, because each connection needs one and the default is low.
 void take_all_descriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
@@ -136,8 +135,7 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
                                                     : oblique::protocol::kFailed;
 }
 
-/// Adds options for the limits that users may set. server/study/limits.h has their defaults and all
-/// other limits.
+/// Adds options for the limits that users may set. server/study/limits.h has all limits.
 void add_limits(CLI::App& app, LoopSettings& loop) {
   constexpr std::size_t kMax = 1'000'000;  // maximum of limits that are counts
   constexpr std::size_t kLongestMessage = oblique::protocol::kMaxFrameBytes;

@@ -44,8 +44,7 @@ bool is_remade_by_view(const solver::ResultList& list) {
   return list.column == "phases" || list.column == "ft_peaks";
 }
 
-/// Returns an SQL expression over the columns of `runs` for the list `part`, with all digits of its
-/// numbers.
+/// Returns SQL over the columns of `runs` for the list `part`, with all digits of its numbers.
 std::string list_sql(const solver::ListPart& part) {
   const std::string list = fmt::format("runs.{}", part.list->column);
   if (part.member.empty()) {

@@ -42,8 +42,8 @@ bool is_list_column(std::string_view name);
 /// Returns whether the values of a column are lists of numbers.
 bool is_list_of_numbers(std::string_view name);
 
-/// Returns the unit of a column; empty for pure numbers, texts, lists of several quantities and
-/// unknown names.
+/// Returns the unit of a column; empty for numbers without unit, texts, mixed lists and unknown
+/// names.
 std::string unit_of_column(std::string_view name);
 
 /// Returns the unit of a member of list elements, such as "s" for t_s.

@@ -182,8 +182,8 @@ SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
   return tokens.subspan(i + 2, end - i - 2);
 }
 
-/// Whether an aggregate function is called at token `i`. min and max with several arguments do not
-/// aggregate.
+/// Returns whether an aggregate function is called at token `i`. min and max with several arguments
+/// do not aggregate.
 bool is_aggregate(SqlTokens tokens, std::size_t i) {
   const SqlFunction* const function = function_at(tokens, i);
   const bool compares = function != nullptr && (function->name == "min" || function->name == "max");
@@ -404,8 +404,7 @@ void add_condition(Intervals& intervals, SqlTokens tokens) {
   }
 }
 
-/// Splits `tokens` at AND into conditions. Returns `tokens` as one condition if they are not joined
-/// by AND.
+/// Splits `tokens` at AND into conditions. Returns them as one condition if AND does not join them.
 std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   const bool is_in_brackets =
       !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;
@@ -437,8 +436,7 @@ std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   return conjuncts;
 }
 
-/// Returns whether the condition requires `error IS NOT NULL`, so that only failed points can meet
-/// it.
+/// Returns whether the condition requires `error IS NOT NULL`, so only failed points can meet it.
 bool requires_failure(std::string_view condition) {
   constexpr std::array<std::string_view, 4> kWords{"error", "is", "not", "null"};
   const auto tokens = sql_tokens(condition);
@@ -447,8 +445,8 @@ bool requires_failure(std::string_view condition) {
   });
 }
 
-/// Returns the allowed interval of an axis; nullptr if it is not restricted or its column depends
-/// on other axes.
+/// Returns the allowed interval of an axis; nullptr if it is not restricted or depends on other
+/// axes.
 const Interval* interval_of(const protocol::Axis& axis, const Intervals& intervals) {
   const auto found = intervals.find(column_of_key(axis.key()));
   // An axis for the length of one link also changes `length`, and `integrator` is a text.
@@ -745,8 +743,8 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   } catch (const StatementError&) {
     refuse(database, parts, rows.sql);
   }
-  // SQLite names a column after its alias or its text, and the text may be a translation of the
-  // user's text.
+  // SQLite names a column after its alias or its text, which may be a translation of the user's
+  // text.
   for (std::size_t i = 0; i < plan.columns.size(); ++i) {
     const char* name = sqlite3_column_name(plan.statement.get(), static_cast<int>(i));
     if (name != nullptr && name != columns_sql[i]) {

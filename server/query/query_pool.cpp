@@ -40,8 +40,8 @@ constexpr std::uint64_t kCancelled = UINT64_MAX;
 
 // ---- The reader process -------------------------------------------------------------------------
 
-/// Returns the size of this process's address space [bytes]. Sanitizers reserve much more than the
-/// memory in use.
+/// Returns the size of this process's address space [bytes]. Sanitizers reserve much more than they
+/// use.
 rlim_t mapped_bytes() {
   std::ifstream sizes("/proc/self/statm");
   rlim_t pages = 0;

@@ -36,8 +36,8 @@ struct QueryLimits {
   std::int64_t time_limit_ms = 30'000;  ///< time limit for each chunk of the answer; 0: no limit
   /// Maximum size of one text, blob or row inside the statement; at most SQLite's limit of 10^9.
   std::int64_t max_value_bytes = std::int64_t{16} << 20U;
-  /// A chunk ends with the first row after this time, so that the first rows of a slow statement
-  /// arrive early.
+  /// A chunk ends with the first row after this time, so that a slow statement's first rows come
+  /// early.
   std::int64_t longest_chunk_ms = 250;
 };
 
@@ -106,12 +106,10 @@ class Answer {
   std::uint64_t chunks_ = 0;
 };
 
-/// A database opened for reading only; a server may write to it at the same time. Only `interrupt`
-/// is thread-safe.
+/// A database opened for reading only, while a server may write. Only `interrupt` is thread-safe.
 class Reader {
  public:
-  /// Throws StorageError with the reason: no file, a directory, a foreign file, another schema, an
-  /// unreadable file.
+  /// Throws StorageError if the file is missing, unreadable, foreign or of another schema.
   explicit Reader(const std::string& path);
 
   /// Starts the answer to `request`. Throws the errors of `prepare_query` and `plan`. The reader

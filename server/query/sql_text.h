@@ -31,8 +31,8 @@ std::vector<SqlToken> sql_tokens(std::string_view text);
 /// Returns whether a token is the keyword or function `word`, ignoring case.
 bool is_word(const SqlToken& token, std::string_view word);
 
-/// Returns the index of the bracket that closes the bracket at `open`; the number of tokens if it
-/// is not closed.
+/// Returns the index of the bracket that closes the one at `open`; the number of tokens if none
+/// does.
 std::size_t closing_bracket(SqlTokens tokens, std::size_t open);
 
 /// Returns the name in a token, without its quotes.

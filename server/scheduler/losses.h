@@ -30,8 +30,7 @@ struct Loss {
   bool operator==(const Loss&) const = default;
 };
 
-/// How likely it is that a returned point makes workers fail. Each level includes the conditions of
-/// the lower levels.
+/// How suspect a point is after losses. Each level includes the conditions of the lower levels.
 enum class Suspicion : std::uint8_t {
   kSound,    ///< may be in a batch of any size with other points
   kSuspect,  ///< several losses; is leased to a worker that holds nothing else
@@ -99,8 +98,8 @@ class WorkerProcesses {
   /// Keeps at most `most_absent` absent processes, the latest ones.
   explicit WorkerProcesses(std::size_t most_absent) : most_absent_(most_absent) {}
 
-  /// Adds a connection of the process `id` and returns the process's number. With an empty `id` the
-  /// process is a new one.
+  /// Adds a connection of the process `id` and returns the process's number. An empty `id` is a new
+  /// process.
   ProcessNumber join(const std::string& id, WorkerId worker);
   /// Removes a connection. A process without connections may be forgotten.
   void leave(ProcessNumber number, WorkerId worker);

@@ -46,8 +46,8 @@ struct Falls {
   std::vector<std::uint64_t> heads;  ///< first open point of each fall, or kNone
 };
 
-/// Returns whether points with the same fall may be apart in this block. They are not if each point
-/// has a fall of its own.
+/// Returns whether points with the same fall may be apart. If each point has its own fall they may
+/// not.
 bool may_share_falls(const protocol::Block& block) {
   const auto axes = protocol::model_axes(block);
   return std::none_of(axes.begin(), axes.end(), [](const protocol::Axis* axis) {

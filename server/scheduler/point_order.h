@@ -18,8 +18,8 @@ namespace oblique::server {
 /// fall. Needs 20 bytes for each run of adjacent points with the same model.
 class PointOrder {
  public:
-  /// Maximum number of models in a study that is arranged, because finding their falls takes about
-  /// a microsecond a model.
+  /// Maximum number of models of an arranged study. Finding falls takes about a microsecond a
+  /// model.
   static constexpr std::uint64_t kMaxModels = 1'000'000;
 
   /// Orders the points from `first` on if points of one fall are apart. `first` is 0 or the number

@@ -37,8 +37,7 @@ std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   return std::exchange(effects_, {});
 }
 
-/// Passes an event to its handler. Ignores it if the handler needs a known study or worker and it
-/// is unknown.
+/// Passes an event to its handler. Ignores an unknown study or worker if the handler needs it.
 template <typename Kind>
 void Scheduler::pass(const Kind& event) {
   if constexpr (requires(Study & study) { on(study, event); }) {
@@ -136,8 +135,7 @@ void Scheduler::on(Study& study, const PriorityChanged& event) {
 }
 
 void Scheduler::on(Study& study, const FailuresForgotten& event) {
-  // The lease in which a point failed may still run. It must no longer contain the point when the
-  // point is leased again.
+  // The failed point must not be in its old lease, which may still run, when it gets a new lease.
   const IntervalSet places = study.points.order().places(event.points);
   for (const LeaseId id : std::set<LeaseId>(study.leases)) {
     const Lease& lease = leases_.at(id);
@@ -422,8 +420,7 @@ std::vector<Interval> Scheduler::open_places(const Lease& lease) const {
       .within(lease.batch.first_place, lease.batch.end());
 }
 
-/// Ends a lease whose points were all answered by other workers, and makes its worker drop the
-/// batch.
+/// Ends a lease whose points others have answered, and makes its worker drop the batch.
 void Scheduler::release_if_answered(LeaseId id) {
   const auto lease = leases_.find(id);
   if (lease != leases_.end() && !has_open_points(lease->second)) {

@@ -137,8 +137,7 @@ class Scheduler {
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
-  /// Returns the time since the worker's last message [ms]. Throws std::out_of_range for an unknown
-  /// worker.
+  /// Returns the time since its last message [ms]. Throws std::out_of_range for an unknown worker.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
 
   /// Throws std::logic_error if the state contradicts itself: a point is in two places or in none,
@@ -236,8 +235,7 @@ class Scheduler {
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
   void withdraw(StudyId id);
-  /// Ends a lease. `loss` names the lost process; without it the points are returned and do not
-  /// count as lost.
+  /// Ends a lease. `loss` names the lost process; without it the points do not count as lost.
   void end_lease(LeaseId lease, const std::optional<Loss>& loss);
   /// Returns the places of the lease's points that have no answer yet.
   std::vector<Interval> open_places(const Lease& lease) const;

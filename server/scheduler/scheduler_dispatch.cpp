@@ -20,8 +20,7 @@ void Scheduler::dispatch() {
   }
 }
 
-/// Uses one unit of the worker's credit for a batch or probe, and moves the worker to the end of
-/// the queue.
+/// Uses one credit of the worker for a batch or probe, and moves it to the end of the queue.
 void Scheduler::use_credit(WorkerId id, Worker& worker) {
   worker.credit -= std::min(worker.credit, 1U);
   ready_workers_.remove(id);
@@ -30,8 +29,7 @@ void Scheduler::use_credit(WorkerId id, Worker& worker) {
   }
 }
 
-/// Returns whether the worker reads its messages, holds neither suspect points nor a probe, and
-/// solves its batches.
+/// Returns whether the worker reads messages, solves batches, and holds no suspect point or probe.
 bool Scheduler::may_hold_more(const Worker& worker) const {
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
   return !worker.is_busy && !holds_suspect && worker.probe == 0 &&
@@ -57,8 +55,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     serve_suspect(id, worker, suspect_study);
     return true;
   } else if (draining_ == id || draining_ == 0) {
-    // Suspect points go to a worker without leases. Only this worker waits until its leases end;
-    // others continue.
+    // Suspect points need a worker without leases. Only this worker waits for that; others
+    // continue.
     draining_ = id;
     return false;
   }
@@ -68,8 +66,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   const StudyId study = std::get<StudyId>(*free_.begin());
   const BatchSize wanted = batch_size_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
-  // A batch may end early at the end of a run, which does not show the worker's capacity. So the
-  // wanted size is stored.
+  // Stores the wanted size: a batch that ended early at the end of a run does not show the
+  // capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
   return true;
@@ -180,8 +178,7 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
         static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / settings_.batch_target_s);
   }
   if (studies_.at(id).points.has_filter()) {
-    // All points of the next batch may pass the filter, even if most points of the last one did
-    // not.
+    // All points of the next batch may pass the filter, even if most of the last batch did not.
     const double in_time =
         pace.s_per_solved() > 0.0
             ? settings_.lanes_batch_s * worker.threads / pace.s_per_solved()
@@ -202,8 +199,7 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
   return wanted;
 }
 
-/// Adds points or models to a batch that would leave SIMD lanes empty, because the larger batch
-/// takes hardly longer.
+/// Adds points or models to a batch if SIMD lanes would be empty and it takes hardly longer.
 void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);

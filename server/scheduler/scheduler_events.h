@@ -53,8 +53,7 @@ struct SchedulerSettings {
   std::size_t vanished_newcomers = 3;
   std::int64_t newcomers_watched_ms = 60'000;
   std::int64_t probe_interval_ms = 1000;  ///< minimum time between two probes of one worker
-  /// A worker holds at most this number of batches more than it has solved since it joined or
-  /// stalled.
+  /// A worker holds at most this many batches more than it has solved since it joined or stalled.
   std::size_t newcomer_batches = 2;
   /// A worker has stalled if it stores nothing for this multiple of the expected duration of its
   /// longest batch, within the limits below. Its batches then go to others.
@@ -184,7 +183,7 @@ struct WorkerUnreachable {
   std::vector<LeaseId> unsent{};
 };
 /// `is_busy` is true while the worker does not read its messages; it then gets no batch. The event
-/// is not a sign of life.
+/// is no sign of life.
 struct WorkerBusy {
   WorkerId worker;
   bool is_busy;
@@ -250,8 +249,7 @@ struct WithdrawStudy {
   WorkerId worker;
   StudyId study;
 };
-/// Make the worker drop the rest of the batch, because its points have answers or are leased to
-/// others.
+/// Make the worker drop the rest of the batch: its points have answers or are leased to others.
 struct ReleaseBatch {
   WorkerId worker;
   LeaseId lease;

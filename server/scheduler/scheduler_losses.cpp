@@ -40,8 +40,7 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   LossHistory losses = lease.batch.losses;
   losses.add(loss);
   const Suspicion suspicion = losses.suspicion(settings_.loss_limits);
-  // The parts are suspect too. Parts without the harmful point are solved; the remaining part is
-  // split again.
+  // The parts are suspect too. Parts without the harmful point are solved; the rest is split again.
   const std::uint64_t parts = suspicion == Suspicion::kSound ? 1 : settings_.suspect_parts;
   for (const Interval& interval : held) {
     points.give_back(split(interval, parts), lease.batch.attempts + 1, losses, now_ms_);
@@ -183,8 +182,8 @@ std::int64_t Scheduler::longest_stall_ms(const Worker& worker, FastestPaces& pac
   double longest_s = 0.0;
   for (const LeaseId id : worker.leases) {
     const Lease& lease = leases_.at(id);
-    // A thread solves the points of its lanes side by side, so a single point takes as long as a
-    // full set.
+    // A thread solves its lanes side by side, so a single point takes as long as a full set of
+    // lanes.
     const double points = std::max(static_cast<double>(lease.batch.points) / worker.threads,
                                    static_cast<double>(settings_.lanes));
     longest_s = std::max(longest_s, fastest_pace(lease.study, paces) * points);
@@ -198,8 +197,8 @@ bool Scheduler::is_proven(const Worker& worker) const {
   return processes_.at(worker.process).proven_since_ms.has_value();
 }
 
-/// Returns whether the worker's process was lost repeatedly, or is new while new processes are
-/// being lost.
+/// Returns whether the worker's process was lost repeatedly, or is new while new ones are being
+/// lost.
 bool Scheduler::is_set_aside(const Worker& worker) const {
   const WorkerProcess& process = processes_.at(worker.process);
   return process.lost_in_a_row >= settings_.set_aside_after ||
@@ -217,7 +216,7 @@ bool Scheduler::is_longest_proven(const Worker& worker) const {
 }
 
 /// Sends a probe, which is an easy point, unless the worker got one recently. Returns whether it
-/// was sent.
+/// did.
 bool Scheduler::probe(WorkerId id, Worker& worker) {
   if (!worker.leases.empty() ||
       (worker.probed_ms && now_ms_ - *worker.probed_ms < settings_.probe_interval_ms)) {

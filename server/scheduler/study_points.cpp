@@ -173,8 +173,7 @@ std::uint64_t StudyPoints::complete_reused(const IntervalSet& points) {
   return places.size();
 }
 
-/// Removes these places from the sets of fresh, leased and returned points. Returns the removed
-/// places.
+/// Removes these places from the fresh, leased and returned points. Returns the removed places.
 IntervalSet StudyPoints::extract(const IntervalSet& places) {
   IntervalSet extracted;
   places.for_each([&](const Interval& range) {
@@ -317,7 +316,7 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   if (!order_.is_arranged()) {
     return fresh_.front();
   }
-  // The worker that began the group continues with its first falls, so this worker gets its last
+  // The worker that began the group continues with its first falls, so this one gets the last
   // falls.
   const Interval last = fresh_.back();
   return Interval{last.begin + (last.end - last.begin) / 2, last.end};

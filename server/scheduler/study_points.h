@@ -66,8 +66,7 @@ class StudyPoints {
   std::uint64_t size() const { return table_.size(); }
   /// Returns whether the points have several models. Makes the table if necessary.
   bool has_models() const { return table_->models() > 1; }
-  /// Releases the table until the next lease. For a complete study without leases also releases the
-  /// order.
+  /// Releases the table until the next lease, and the order of a complete study without leases.
   void rest(bool has_leases);
   /// The current mapping between points and places.
   const PointOrder& order() const { return order_; }
@@ -84,8 +83,7 @@ class StudyPoints {
     std::uint32_t attempts;
     std::uint32_t alone;  ///< number of workers that were lost while they held only this point
   };
-  /// Returns the points that have been failing since `until_ms` or before, and moves them to
-  /// committing.
+  /// Returns the points that have been failing since `until_ms`, and moves them to committing.
   std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
   /// Returns the leased points at the places `parts` to the sets of returned points, with the given
@@ -124,8 +122,7 @@ class StudyPoints {
   bool may_leave_out(const IntervalSet& points) const;
   /// Returns whether any returned points have this level of suspicion.
   bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
-  /// Returns when the next points of this level of suspicion were returned. There must be such
-  /// points.
+  /// Returns when the next points of this level were returned. There must be such points.
   std::int64_t returned_ms(Suspicion suspicion) const {
     return returned(suspicion).begin()->second.returned_ms;
   }

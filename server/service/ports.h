@@ -80,15 +80,14 @@ class Ports {
   /// Sets the number of the request in `reply`.
   bool reply(const Client& client, protocol::ClientReply reply);
   bool reply_error(const Client& client, const std::string& message);
-  /// Reports to the client that its request waits or runs. Returns false if the client has
-  /// disconnected.
+  /// Reports to the client that its request waits or runs. Returns false if the client is gone.
   bool reply_still_working(const Client& client, bool runs);
 };
 
 protocol::ClientReply error_reply(const std::string& message);
 
-/// Writes log lines that peers can cause at any rate: at most 20 in 10 s, and then the number of
-/// suppressed lines.
+/// Writes log lines that peers can cause at any rate: at most 20 in 10 s, then the number of
+/// others.
 class PeerLog {
  public:
   explicit PeerLog(Ports& ports) : ports_(ports) {}

@@ -67,8 +67,7 @@ class Service {
   /// Notifies workers and clients that the server stops. Results are still stored.
   void stop(Instant now);
 
-  /// Returns whether messages of workers should be read now. While it is false, no worker counts as
-  /// silent.
+  /// Returns whether messages of workers should be read now. If not, no worker counts as silent.
   bool has_room() const { return ledger_.has_room(); }
   /// Returns whether nothing more can be stored, so that the server should end.
   bool storage_is_gone() const { return ledger_.is_gone(); }
@@ -85,8 +84,8 @@ class Service {
   std::vector<protocol::WorkerStatus> worker_statuses(std::size_t most, Instant now) const;
 
  private:
-  /// Passes an event to the scheduler and carries out the effects. Does the same with all events
-  /// that these cause.
+  /// Passes an event to the scheduler, carries out the effects, and repeats this for events they
+  /// cause.
   void feed(const Event& event, Instant now);
   /// `results` is the message from which a ResultsReceived was made.
   void handle(const Event& event, Instant now, protocol::Results* results = nullptr);

@@ -177,8 +177,8 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
         on_stored, [this, id] { core_.states.remove(id); });
 }
 
-/// Handles a submitted recipe that differs from the stored one: appends its additional points, or
-/// refuses it.
+/// Handles a submitted recipe that differs from the stored one: appends its new points or refuses
+/// it.
 void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
                         const Growth& growth, std::int32_t priority, Instant now) {
   const StudyRecord& study = core_.states.record(id);
@@ -397,8 +397,7 @@ void StudyChanges::finish(StudyId id, Instant now) {
 
 // ---- Bounds and replies ------------------------------------------------------------------------
 
-/// Returns whether the limits allow this number of additional studies and points. If not, sends the
-/// client an error.
+/// Returns whether the limits allow further studies and points. If not, the client gets an error.
 bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::uint64_t points) {
   const auto fits = [&](const char* what, std::uint64_t open, std::uint64_t more,
                         std::uint64_t most, const char* option = "") {
@@ -425,8 +424,7 @@ StudyChanges::OnStored StudyChanges::submitted_reply(const Client& client, Study
   return [this, client, id](Instant now) { reply_submitted(client, id, {}, now); };
 }
 
-/// Sends the reply when the lookup of reusable results has ended, or at the latest after
-/// `kLongestWait_ms`.
+/// Sends the reply when the lookup of results has ended, at the latest after `kLongestWait_ms`.
 void StudyChanges::reply_submitted(const Client& client, StudyId id, protocol::SubmitReply reply,
                                    Instant now) {
   constexpr std::int64_t kLongestWait_ms = 1500;
@@ -467,8 +465,8 @@ void StudyChanges::reply_changed(const Client& client, const protocol::StudyStat
 
 // ---- Results of other studies ------------------------------------------------------------------
 
-/// Returns whether a study can reuse results. `solver_version` is the version of its own results,
-/// or empty.
+/// Returns whether a study can reuse results. `solver_version` made the results that it already
+/// has; empty if it has none.
 bool StudyChanges::should_look_up(const ReadRequest& read, std::string_view solver_version) const {
   return !read.request.submit().no_reuse() && core_.states.have_results() &&
          (solver_version.empty() || solver_version == core_.solver_version);

@@ -71,8 +71,7 @@ class WorkerSessions {
   void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0) {
     send_frame(worker, protocol::encode(message), lease);
   }
-  /// Sends the stored bytes of the recipe, because encoding a long recipe for each worker would
-  /// take long.
+  /// Sends the stored bytes of the recipe, because encoding a long recipe for each worker is slow.
   void define(const DefineStudy& define, const std::string& recipe_bytes);
   void notify_all(const std::string& text);
   /// Notifies all workers that the server stops, and also workers that join later.

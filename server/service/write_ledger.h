@@ -60,8 +60,7 @@ class WriteLedger {
   /// Returns the size of pending results [bytes].
   std::size_t bytes() const { return results_.bytes; }
 
-  /// Returns whether no batch should be sent, because the database accepts nothing or is far
-  /// behind.
+  /// Returns whether no batch should be sent, because the database accepts nothing or is too slow.
   bool holds_batches() const { return !fault_.empty() || is_behind_; }
   /// Returns whether further messages of workers should be read.
   bool has_room() const {

@@ -195,8 +195,7 @@ class Storage {
   /// Throws StorageGone if the file at the database's path was deleted or replaced.
   virtual void check() {}
 
-  /// Deletes at most `most` rows of deleted studies in one transaction. Throws the errors of
-  /// `commit`.
+  /// Deletes at most `most` rows of deleted studies in one transaction. Throws `commit`'s errors.
   virtual ClearedAway clear_away(std::size_t /*most*/) { return ClearedAway::kAll; }
 
   /// Moves the write-ahead log into the database and empties it, so that one file contains

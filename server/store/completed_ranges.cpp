@@ -46,8 +46,8 @@ void update_counts_and_state(sqlite3* database, std::uint64_t study_id) {
        {"UPDATE main.studies SET left_out = " + completed +
             " - (SELECT count(*) FROM main.results WHERE study_id = ?1) WHERE study_id = ?1",
         std::string("DELETE FROM main.reused_points WHERE study_id = ?1"),
-        // Removes "/POINT" from `reused_from`, which is STUDY/POINT; the name of a study may
-        // contain slashes.
+        // Removes "/POINT" from `reused_from`, which is STUDY/POINT; the study's name may contain
+        // slashes.
         std::string("INSERT INTO main.reused_points (study_id, source, points) SELECT ?1,"
                     " substr(reused_from, 1, length(rtrim(reused_from, '0123456789')) - 1) AS src,"
                     " count(*) FROM main.results WHERE study_id = ?1 AND reused_from IS NOT NULL"
@@ -82,8 +82,7 @@ std::optional<Interval> CompletedRanges::range_before(std::uint64_t study_id, st
   return range;
 }
 
-/// Deletes the ranges that begin in [first, last]. Returns the largest end of a deleted range, or
-/// 0.
+/// Deletes the ranges that begin in [first, last]. Returns the largest deleted end, or 0.
 std::uint64_t CompletedRanges::take_out(std::uint64_t study_id, std::uint64_t first,
                                         std::uint64_t last) {
   std::uint64_t end = 0;

@@ -44,8 +44,7 @@ class CompletedRanges {
   /// Forgets the added points, because the transaction was rolled back.
   void forget() { gathered_.clear(); }
 
-  /// Returns the stored ranges of a study that overlap `points`. A range may begin before `points`
-  /// or end after them.
+  /// Returns the stored ranges that overlap `points`. They may begin before it or end after it.
   IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
   /// Returns the points in `points` that are neither completed nor added.
   IntervalSet open_points(std::uint64_t study_id, const IntervalSet& points);

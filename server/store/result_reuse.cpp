@@ -14,8 +14,7 @@
 namespace oblique::server {
 namespace {
 
-/// Maximum number of points, and of lookups, in one change. If all points have a result, this takes
-/// about 50 ms.
+/// Maximum number of points, and of lookups, in one change: about 50 ms if all have a result.
 constexpr std::uint64_t kPart = 4096;
 
 /// Selects the first row of another study that has these inputs, is solved and has a correct

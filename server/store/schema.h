@@ -14,8 +14,7 @@ void create_tables(sqlite3* database);
 /// objects with other names. Throws StorageError, for example if a table has the name of a view.
 void create_views(sqlite3* database);
 
-/// Returns the names of tables of this schema that are missing or have other columns. Throws
-/// StorageError.
+/// Returns the tables of this schema that are missing or have other columns. Throws StorageError.
 std::vector<std::string> differing_tables(sqlite3* database);
 
 /// An SQL expression for the highest study number that was ever used; 0: none. It counts rows of

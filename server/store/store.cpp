@@ -26,8 +26,8 @@ Store::Store(const std::string& path)
         return static_cast<std::atomic<bool>*>(interrupted)->load() ? 1 : 0;
       },
       &interrupted_);
-  // Disables triggers. A trigger of another program might never end, and our trigger only serves
-  // other programs.
+  // Disables triggers: those of other programs might never end, and ours only serves other
+  // programs.
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   // SQLite need not overwrite deleted rows with zeros, because that would write many pages.
@@ -309,8 +309,7 @@ bool Store::has_study(std::uint64_t study_id) {
   return found;
 }
 
-/// Returns the number of the row of `models` for the study's model number `model`. Inserts a
-/// missing row.
+/// Returns the row number in `models` of the study's model `model`. Inserts a missing row.
 std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
   if (models_.size() >= kMaxCachedModels) {
     models_.clear();

@@ -54,11 +54,11 @@ class Store final : public Storage {
   /// Returns the number of rows that `clear_away` has deleted.
   std::uint64_t cleared_rows() const { return cleared_rows_; }
 
-  /// Runs `work` in a durable transaction. If `work` throws, rolls back. Throws the errors of
+  /// Runs `work` in a durable transaction; rolls back if `work` throws. Throws the errors of
   /// `commit`.
   void write(const std::function<void()>& work);
-  /// Returns the connection, for programs that change the file without a server. Triggers and views
-  /// are disabled in it.
+  /// Returns the connection, for programs that change the file without a server. It has no
+  /// triggers.
   sqlite3* connection() const { return database_.get(); }
 
   /// Returns whether the file was created by this object.
@@ -70,12 +70,10 @@ class Store final : public Storage {
   /// Returns all studies in the order of their numbers, with their completed points. Throws
   /// StorageError, also for a study whose number, recipe or size was changed after it was stored.
   std::vector<StoredStudy> studies();
-  /// Returns a sentence about each study that `studies` skipped because this version refuses the
-  /// study.
+  /// Returns a sentence about each study that `studies` skipped because this version refuses it.
   const std::vector<std::string>& skipped() const { return skipped_; }
 
-  /// Return the highest number of a study or worker that was ever used; 0: none. Throw
-  /// StorageError.
+  /// Return the highest number of a study or worker ever used; 0: none. Throw StorageError.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
 

@@ -44,8 +44,7 @@ StoredStudy study_in(const Statement& row) {
   return study;
 }
 
-/// Throws StorageError if another program changed a study, because its rows may belong to other
-/// points now.
+/// Throws StorageError if a study was changed so that its rows may belong to other points.
 void check_studies(sqlite3* database) {
   Statement wrong(database, fmt::format("SELECT study_id, name FROM studies WHERE checksum <> {}",
                                         kStudyChecksum));
@@ -60,8 +59,7 @@ void check_studies(sqlite3* database) {
   }
 }
 
-/// Returns why this version refuses the study, or an empty text. Throws StorageError if the recipe
-/// cannot be read.
+/// Returns why this version refuses the study, or "". Throws StorageError for an unreadable recipe.
 std::string study_error(const StoredStudy& study) {
   if (!protocol::is_utf8(study.name)) {  // the name is part of messages, which must be UTF-8
     return "its name is not UTF-8: rename it with sqlite3 while no server runs";

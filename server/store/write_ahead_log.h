@@ -31,8 +31,7 @@ class WriteAheadLog {
   bool is_held_long() const { return pages_ > kHeldLong * long_pages_; }
   /// Sets the length [pages] above which `shorten` copies the log.
   void shorten_at(int pages) { long_pages_ = pages; }
-  /// Makes SQLite copy and delete the log when the database is closed. Must not be called after a
-  /// failed sync.
+  /// Makes SQLite copy and delete the log on closing. Must not be called after a failed sync.
   void delete_on_close() {
     sqlite3_db_config(database_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
   }

@@ -29,8 +29,8 @@ constexpr std::chrono::milliseconds kClearPause{1000};
 /// Number of failed attempts to merge the log before the failure is reported.
 constexpr int kQuietTries = 5;
 
-/// Number of attempts to merge the log when the writer ends, and the pause between them: three
-/// seconds in all.
+/// Number of attempts to merge the log at the end, and the pause between them: three seconds in
+/// all.
 constexpr int kLastTries = 15;
 constexpr std::chrono::milliseconds kLastPause{200};
 

@@ -22,8 +22,7 @@ namespace oblique::server {
 /// Counts observed values in bins. Not thread-safe.
 class Histogram {
  public:
-  /// `bounds` must ascend. Each is the largest value of its bin. Values above all bounds have a
-  /// further bin.
+  /// `bounds` must ascend. Each is the largest value of its bin. Larger values have one more bin.
   explicit Histogram(std::vector<double> bounds)
       : bounds_(std::move(bounds)), counts_(bounds_.size() + 1) {}
 
@@ -60,8 +59,7 @@ struct WriteReport {
     kFault,      ///< the database accepts no changes and jobs wait; reported once
     kRecovered,  ///< the database accepts changes again
     kGone,       ///< the file is gone or a sync failed, so nothing more is written; reported once
-    /// the log cannot be merged; `error` has the reason; reported once per finished study and at
-    /// the end
+    /// the log cannot be merged, see `error`; reported once per finished study and at the end
     kUnmerged,
   };
   Kind kind;
@@ -105,8 +103,7 @@ class GroupCommit {
   /// regularly while no job waits.
   std::vector<WriteReport> maintain();
 
-  /// Merges the log. Returns false if it was not merged; then check `is_gone` before another
-  /// attempt.
+  /// Merges the log. Returns false if that failed; then check `is_gone` before another attempt.
   bool merge(std::vector<WriteReport>& reports);
   /// Returns the report of a failed `merge`.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
@@ -144,8 +141,7 @@ class Writer {
 
   void submit(WriteJob job);
 
-  /// Continues deletions that an earlier process left. Must be called when only this object uses
-  /// the storage.
+  /// Continues deletions that an earlier process left. Nothing else may use the storage any more.
   void resume_deletions();
 
   /// Writes the waiting jobs, merges the log and ends the thread. Interrupts statements that take

@@ -60,8 +60,7 @@ class IntervalSet {
   /// Returns the highest interval. The set must not be empty.
   Interval back() const { return {ends_.rbegin()->first, ends_.rbegin()->second}; }
 
-  /// Returns the first interval that ends after `point`, without its part before `point`; nothing
-  /// if there is none.
+  /// Returns the first interval that ends after `point`, without its part before `point`, if any.
   std::optional<Interval> first_from(std::uint64_t point) const;
 
   /// Returns the parts of the set inside [begin, end), in order.

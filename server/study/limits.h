@@ -12,8 +12,7 @@ inline constexpr std::size_t kMiB = std::size_t{1} << 20U;
 
 // ---- Defaults of the options ------------------------------------------------------------------
 
-/// Maximum number of connections, enough for a large cluster. Each needs a descriptor and some
-/// kilobytes.
+/// Maximum number of connections, for a large cluster. Each needs a descriptor and some kilobytes.
 inline constexpr std::size_t kConnections = 4096;
 /// Maximum size of unread replies to one peer: four replies of the maximum size.
 inline constexpr std::size_t kWaitingOutBytes = 64 * kMiB;
@@ -44,8 +43,7 @@ inline constexpr std::size_t kHandshakesOfSource = kHandshakes / 2;
 
 // ---- Writes -----------------------------------------------------------------------------------
 
-/// Maximum number of unstored writes for which no client waits, because small writes use memory
-/// too.
+/// Maximum number of unstored writes for which no client waits, because small ones use memory too.
 inline constexpr std::size_t kUnstoredWrites = 80'000;
 /// Maximum number of unstored changes of clients, and maximum size of their recipes.
 inline constexpr std::size_t kUnstoredChanges = 10'000;
@@ -55,8 +53,7 @@ inline constexpr std::size_t kDeferredRequests = 1000;
 
 // ---- Requests of clients ----------------------------------------------------------------------
 
-/// A longer request is parsed on the check thread, because parsing it takes more than a
-/// millisecond.
+/// A longer request is parsed on the check thread, because that takes more than a millisecond.
 inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
 /// Maximum number and total size of long requests that wait for the check thread.
 inline constexpr std::size_t kWaitingChecks = 64;
@@ -74,8 +71,7 @@ inline constexpr std::size_t kRecipesOfPage = 4;
 
 // ---- Queries ----------------------------------------------------------------------------------
 
-/// Maximum number of running queries of one client. A query of another client can then start at
-/// once.
+/// Maximum number of running queries of one client, so that another client's query starts at once.
 inline constexpr std::size_t kRunningQueriesOfClient = 2;
 /// Maximum number of waiting queries. A statement may have a megabyte.
 inline constexpr std::size_t kWaitingQueries = 64;
@@ -90,8 +86,7 @@ inline constexpr std::size_t kRunningTraces = 2;
 inline constexpr std::size_t kWaitingTraces = 64;
 /// Maximum number of traces that the page requests or sends at a time. Further requests wait.
 inline constexpr std::size_t kTracesOfPage = 4;
-/// Time from request to answer, including waiting: the default, and the maximum that clients can
-/// request.
+/// Time from request to answer, including waiting: the default, and the maximum.
 inline constexpr std::int64_t kTraceTime_ms = 60'000;
 inline constexpr std::int64_t kLongestTraceTime_ms = 600'000;
 

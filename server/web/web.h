@@ -85,8 +85,7 @@ class Web {
   HttpServer http_;  // declared last, because its thread uses the other members
 };
 
-/// Health: 200 if the latest snapshot, or the server's start, is recent, because then the event
-/// loop runs.
+/// Health: 200 if the latest snapshot, or the start, is recent, which means that the loop runs.
 HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms);
 
 /// Readiness: 200 unless the server is stopping, the database accepts no results, or its disk is

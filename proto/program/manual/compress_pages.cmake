@@ -1,5 +1,4 @@
-# Compresses the manual pages when cpack runs it. The results contain no times or names, so that
-# they are reproducible.
+# Compresses manual pages when cpack runs it. The results contain no times or names.
 find_program(GZIP gzip REQUIRED)
 file(GLOB found "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/share/man/man1/*.1"
      "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/*/usr/share/man/man1/*.1")

@@ -17,8 +17,7 @@ using Fields = std::map<std::string, std::string>;
 /// Returns whether all fields are UTF-8. Messages to the service must be UTF-8.
 bool is_text(const Fields& fields);
 
-/// Reads fields. Each function throws std::invalid_argument, which names the field and what is
-/// allowed.
+/// Reads fields. Functions throw std::invalid_argument with the field and what is allowed.
 class FieldReader {
  public:
   explicit FieldReader(const Fields& fields) : fields_(fields) {}
@@ -26,8 +25,8 @@ class FieldReader {
   std::optional<std::string> text(const std::string& name) const;
   std::optional<std::uint64_t> whole(const std::string& name) const;
   std::optional<double> number(const std::string& name) const;
-  /// Returns the number of cells along one side of a picture, from 1 to kMaxCells; `usual` if the
-  /// field is missing.
+  /// Returns the number of cells along a side, from 1 to kMaxCells; `usual` if the field is
+  /// missing.
   std::uint64_t cells(const std::string& name, std::uint64_t usual) const;
   /// Returns the field `where`, a complete SQL expression, or an empty text.
   std::string condition() const;

@@ -56,8 +56,7 @@ PictureColumn picture_column(const FieldReader& fields, const std::string& name,
 
 constexpr std::uint64_t kUsualCells = 256;
 
-/// Returns the axis of that key; null if the block has no such axis with a list or a range of
-/// values.
+/// Returns the axis of that key; null if the block has no such axis with listed or ranged values.
 const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key) {
   const auto axis = std::ranges::find_if(axes, [key](const AxisLayout& layout) {
     return layout.axis->key() == key && protocol::has_own_values(*layout.axis);
@@ -84,8 +83,7 @@ struct Side {
   }
 };
 
-/// Selects the values to show along the side `name`: all values, or evenly spaced values including
-/// both ends.
+/// Selects the values to show along the side `name`: all, or evenly spaced ones with both ends.
 Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::string& name) {
   Side side{&axis};
   side.first = fields.whole(name + "0").value_or(0);
@@ -107,8 +105,7 @@ Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::strin
   return side;
 }
 
-/// Parses the field `at`. Returns the index of the fixed value by key, for all axes that the slice
-/// does not show.
+/// Parses the field `at`: the index of the fixed value of each axis that the slice does not show.
 std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& axes,
                                                  const std::string& at) {
   std::map<std::string, std::uint64_t> held;
@@ -249,8 +246,7 @@ void SliceAnswer::list_points() {
   numbers_.resize(points_.size());
 }
 
-/// Returns a query of point, value and mark of all cells that have a row. SQLite looks up each
-/// point by its key.
+/// Selects point, value and mark of all cells that have a row. SQLite looks up each point by key.
 protocol::StudyQuery SliceAnswer::query() const {
   protocol::StudyQuery query;
   query.add_select("point");
@@ -470,8 +466,7 @@ StudyAnswer::Next BinsAnswer::next(const ServedStudy& study) {
   return counts_.empty() ? Next(counts_query()) : Next(answer(study.id));
 }
 
-/// Returns a query of the solved points that meet the condition and have values on both axes of the
-/// picture.
+/// Queries the solved points that meet the condition and have values on all axes of the picture.
 protocol::StudyQuery BinsAnswer::query() const {
   std::string where =
       condition().empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition());

@@ -18,8 +18,7 @@
 
 namespace oblique::server {
 
-/// A limited number of slots, for example for concurrent requests. Must outlive all slots that it
-/// gives out.
+/// A limited number of slots, for example for concurrent requests. Must outlive all slots.
 class Slots {
  public:
   explicit Slots(std::size_t count) : free_(count) {}
@@ -50,8 +49,7 @@ class RecipeCache {
   std::deque<std::pair<std::uint64_t, Table>> kept_;  // the latest first
 };
 
-/// Lets the HTTP thread use the service like a client: passes requests to the loop's thread, and
-/// replies back.
+/// Lets the HTTP thread use the service like a client: passes requests and replies between threads.
 class ServiceClient {
  public:
   /// The identity of this client in the service. No connection has this identity.
@@ -131,8 +129,7 @@ class ServiceExchange {
   std::uint64_t chunks_ = 0;
 };
 
-/// Returns the HTTP answer for an error of the service. It does not contain the name of an unknown
-/// study.
+/// Returns the HTTP answer for an error of the service, without the name of an unknown study.
 HttpAnswer failure(const protocol::ErrorReply& error);
 
 }  // namespace oblique::server

@@ -31,8 +31,8 @@ using nlohmann::ordered_json;
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-/// Maximum length of a list of values in the answer. Longer lists are left out; slices contain the
-/// values that they show.
+/// Maximum length of a list of values. Longer lists are omitted; slices contain the values they
+/// show.
 constexpr std::uint64_t kMaxListed = 4096;
 
 ordered_json axis_json(const protocol::AxisLayout& layout) {
@@ -345,8 +345,8 @@ HttpAnswer check_answer(const std::string& body) {
 }
 
 protocol::SubmitRequest study_of_body(const std::string& body) {
-  // Maximum nesting of JSON, which is also Protobuf's. Copying or writing deeper JSON could
-  // overflow the stack.
+  // Maximum nesting of JSON, also Protobuf's. Copying or writing deeper JSON could overflow the
+  // stack.
   constexpr int kDeepest = 50;
   bool is_deep = false;
   auto whole = nlohmann::json::parse(

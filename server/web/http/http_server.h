@@ -28,7 +28,7 @@ struct HttpLimits {
   /// A connection is closed after this time without any transfer, except while the server prepares
   /// its answer. The head of a request must arrive within this time after connecting.
   std::chrono::seconds idle{10};
-  /// Request bodies and answers, except streams, may take `idle` plus one second per this number of
+  /// Requests and answers, except streams, may take `idle` plus one second per this number of
   /// bytes.
   std::size_t least_bytes_a_second = std::size_t{4} * 1024;
 };
@@ -37,8 +37,7 @@ struct HttpLimits {
 struct HttpHandlers {
   /// Answers a request. Throws std::invalid_argument for a wrong request.
   std::function<HttpOutcome(const HttpRequest&)> answer;
-  /// Returns the answer that refuses a POST, before its body is read; nothing if the POST is
-  /// accepted.
+  /// Returns the answer that refuses a POST before its body is read; nothing if it is accepted.
   std::function<std::optional<HttpAnswer>(const HttpRequest&)> refuse_change;
   /// May be called on any thread.
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;

@@ -7,8 +7,7 @@
 
 #include "server/web/http/http_message.h"
 
-// Address of the HTTP server, and rules by which it refuses requests before it examines their
-// content.
+// Address of the HTTP server, and rules that it applies to requests before their content.
 namespace oblique::server {
 
 struct HttpAddress {
@@ -21,8 +20,7 @@ struct HttpAddress {
 /// allowed.
 std::optional<HttpAddress> parse_http_address(const std::string& text);
 
-/// Returns the host in a Host header in lower case, without port and brackets; empty if the header
-/// is malformed.
+/// Returns the host in a Host header in lower case, without port and brackets; empty if malformed.
 std::string host_without_port(const std::string& header);
 
 /// Names of this server that a Host header may contain. A malicious page can make its own name

@@ -103,8 +103,7 @@ std::optional<HttpAnswer> Page::refuse_change(const HttpRequest& request) const 
                              : std::optional(error_answer(MHD_HTTP_UNAUTHORIZED, kHowToEnter));
 }
 
-/// Exchanges the token for a cookie, and so removes the token from the browser's address bar and
-/// history.
+/// Exchanges the token for a cookie, which keeps the token out of the browser's history.
 HttpAnswer Page::enter(const HttpRequest& request) const {
   if (!token().is(request.fields.at("token"))) {
     return text_answer(MHD_HTTP_FORBIDDEN,

@@ -79,8 +79,7 @@ class EventFeed {
   std::string id_;  ///< ID of the overview; empty if there is none yet
 };
 
-/// Answers requests for the page's files and API. README.md lists every path. Used by the HTTP
-/// thread.
+/// Answers requests for the page's files and API (README.md lists the paths), on the HTTP thread.
 class Page {
  public:
   /// `service` and `snapshots` must outlive the page.
@@ -89,11 +88,10 @@ class Page {
 
   const PageToken& token() const { return settings_.token; }
 
-  /// Returns the answer that refuses a POST, before its body is read; nothing if the POST is
-  /// accepted.
+  /// Returns the answer that refuses a POST before its body is read; nothing if it is accepted.
   std::optional<HttpAnswer> refuse_change(const HttpRequest& request) const;
-  /// Answers a request; returns nothing if the path is unknown. Throws std::invalid_argument for a
-  /// wrong request.
+  /// Answers a request; nothing for an unknown path. Throws std::invalid_argument for a wrong
+  /// request.
   std::optional<HttpOutcome> answer(const HttpRequest& request);
 
  private:

@@ -25,8 +25,7 @@ std::string text_of(double value) {
   return std::isnan(value) ? "NaN" : solver::exact_number(value);
 }
 
-/// Writes metrics in Prometheus' text format. Values of labels need no escaping, because they are
-/// fixed words.
+/// Writes metrics in Prometheus' text format. Labels have fixed words, which need no escaping.
 class MetricText {
  public:
   void gauge(std::string_view name, std::string_view help) { family(name, "gauge", help); }

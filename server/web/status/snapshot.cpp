@@ -14,8 +14,7 @@
 namespace oblique::server {
 namespace {
 
-/// A worker's silence is shown from this time on. Heartbeats come every 900 ms, so shorter silences
-/// mean nothing.
+/// A shorter silence of a worker is not shown, because heartbeats come every 900 ms.
 constexpr std::uint32_t kSilence_ms = 2000;
 
 /// The time in which `threads_wanted` threads would solve all open points.
