@@ -128,7 +128,7 @@ class PointTable {
 bool is_close(double value, double own);
 /// Returns whether all parameters are close. Whole numbers must be equal.
 bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own);
-/// Returns the same for two canonical texts of models. `model` may be any text.
+/// Returns whether two canonical texts of models are close. `model` may be any text.
 bool is_close(std::string_view model, std::string_view own);
 
 /// Sets the inputs of the result's point. The model is set only in studies with several models.

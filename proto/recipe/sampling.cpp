@@ -43,7 +43,8 @@ std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
   if (n < 2) {
     return 0;
   }
-  // Permutes all numbers that have as many bits as n - 1, again until the result is below n.
+  // Permutes all numbers that have as many bits as n - 1, and repeats this until the result is
+  // below n.
   const auto bits = static_cast<int>(std::bit_width(n - 1));
   do {
     i = shuffled_bits(i, bits, key);

@@ -26,7 +26,7 @@ bool is_worker_frame_within_limits(std::string_view frame);
 /// need. If not, the recipe is padded with empty messages or cannot be parsed.
 bool is_unpadded_request(std::string_view frame);
 
-/// Returns the same for an encoded recipe.
+/// Returns whether an encoded recipe has enough bytes for the axes that its blocks need.
 bool is_unpadded_recipe(std::string_view recipe);
 
 /// Returns the number of a client's request, from the beginning of its frame; 0 if it is missing.

@@ -194,7 +194,7 @@ class StudyCheck {
   Statement studies_;
   Statement rows_;
   Statement definition_;
-  // the last model number in the recipe and number of its row that were equal
+  // model number in the recipe, and number of the row of `models`, that were last equal
   std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};
   std::string name_;  // name of the current study
   std::vector<std::string> study_faults_;

@@ -27,7 +27,7 @@ std::string_view name_of(AccessMode mode);
 
 /// Returns the numeric address to bind. "*" becomes "::", which includes IPv4, if the system has
 /// IPv6. Throws solver::InputError for text that is not an address, for an address other than
-/// loopback without keys and `insecure`, and for keys together with `insecure`.
+/// loopback if there are neither keys nor `insecure`, and if there are both.
 std::string address_to_bind(const AccessSettings& settings);
 
 /// The current authorized keys.

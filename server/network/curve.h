@@ -15,8 +15,8 @@
 
 #include "server/network/authenticator.h"
 
-// The server's side of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium. Turns bytes of
-// commands and frames into others; has no socket.
+// The server's side of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium. Works on the bytes
+// of commands and frames; has no socket.
 namespace oblique::server {
 
 inline constexpr std::size_t kKeyBytes = std::tuple_size_v<protocol::CurveKey>;
@@ -85,7 +85,7 @@ class CurveSession {
   CurveSession(const Secret<kKeyBytes>& shared_key, std::uint64_t received_counter)
       : key_(shared_key), received_counter_(received_counter) {}
 
-  /// Returns the data of READY with these properties. Must be called once, before the others.
+  /// Returns the data of READY with these properties. Must be called before the other functions.
   std::string ready(std::string_view properties);
   /// Appends a MESSAGE with this body to `out`.
   void seal(std::string_view body, std::string& out);

@@ -323,9 +323,9 @@ bool Network::make_room(Port port, const PeerAddress& address) {
 }
 
 /// Applies the limit for one source address. Returns false if the new connection must be refused;
-/// waiting, it would delay other sources. Ends the oldest handshake if it has had its minimum time,
-/// else a recent one. So most handshakes of slow peers finish, and a fast peer is soon admitted
-/// among many that never finish.
+/// if it waited, it would delay other sources. Ends the oldest handshake if it has had its minimum
+/// time, else a recent one. So most handshakes of slow peers finish, and a fast peer is soon
+/// admitted among many that never finish.
 bool Network::make_room_at_source(const PeerAddress& address) {
   constexpr std::size_t kPartForNewest = 8;
   const auto found = handshakes_of_.find(address.source);
@@ -502,7 +502,7 @@ void Network::read_paused_again() {
 
 bool Network::has_unread_input(const std::string& identity) const {
   // A trace on a slow line may take longer to arrive than a worker may be silent. So a message that
-  // is still arriving counts.
+  // is still arriving counts as unread input.
   constexpr std::int64_t kPauseInMessage_ms = 1000;
   const Peer* const peer = find(identity);
   return peer != nullptr &&

@@ -449,7 +449,7 @@ bool requires_failure(std::string_view condition) {
 /// axes.
 const Interval* interval_of(const protocol::Axis& axis, const Intervals& intervals) {
   const auto found = intervals.find(column_of_key(axis.key()));
-  // An axis for the length of one link also changes `length`, and `integrator` is a text.
+  // Excludes lengths, because an axis of one link changes `length` too, and the text `integrator`.
   const bool is_own = protocol::has_own_values(axis) && !axis.key().starts_with("length") &&
                       axis.key() != "integrator";
   return found == intervals.end() || !is_own ? nullptr : &found->second;

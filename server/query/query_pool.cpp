@@ -95,7 +95,7 @@ void send_frame(const std::string& reply, bool is_last) {
 void send_answer(const std::string& path, const protocol::QueryRequest& request) {
   Reader reader(path);
   QueryLimits limits;
-  limits.time_limit_ms = 0;  // none here: the server enforces the deadline
+  limits.time_limit_ms = 0;  // the server enforces the time limit
   Answer answer = reader.answer(request, limits);
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();

@@ -35,7 +35,7 @@ enum class Suspicion : std::uint8_t {
   kSound,    ///< may be in a batch of any size with other points
   kSuspect,  ///< several losses; is leased to a worker that holds nothing else
   kRisky,    ///< a single point; a worker was lost while it held only this point
-  kFailing   ///< the same for several workers; fails unless a lost worker returns
+  kFailing   ///< several workers were lost with only this point; it fails unless one returns
 };
 
 struct LossLimits {
@@ -46,7 +46,7 @@ struct LossLimits {
 /// The losses of a range of points. A process counts once.
 class LossHistory {
  public:
-  /// Each loss of kNoProcess counts.
+  /// Adds a loss. A process counts once, but every loss of kNoProcess counts.
   void add(const Loss& loss) {
     constexpr std::size_t kMaxNoted = 16;  // further losses count only if they are `alone`
     const auto known = std::ranges::find(losses_, loss.process, &Loss::process);

@@ -226,7 +226,7 @@ void Scheduler::requeue(StudyId id) {
   }
   const bool has_suspect = is_open(study) && study.has_suspect();
   const bool changes_suspect = has_suspect ? suspects_.insert(id).second : suspects_.erase(id) > 0;
-  // workers may have to wait for suspect points, or need not any more
+  // other workers may be served now
   if ((rank && !had_free) || changes_suspect) {
     ready_workers_.unpark_all();
   }
@@ -483,7 +483,7 @@ bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   }
   const StudyPoints& points = studies_.at(lease->second.study).points;
   const Batch& batch = lease->second.batch;
-  // Refuses such a message before looking up its points, because the lookup may take long.
+  // Refuses an impossible message before looking up its points, which may take long.
   if (event.left_out.size() > batch.points || lease->second.study != event.study ||
       !points.may_leave_out(event.left_out)) {
     return true;

@@ -137,7 +137,8 @@ class Scheduler {
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
-  /// Returns the time since its last message [ms]. Throws std::out_of_range for an unknown worker.
+  /// Returns the time since the worker's last message [ms]. Throws std::out_of_range if it is
+  /// unknown.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
 
   /// Throws std::logic_error if the state contradicts itself: a point is in two places or in none,
@@ -178,7 +179,7 @@ class Scheduler {
   struct Pace {
     double busy_s = 0.0;  ///< thread time for `points`; recent messages have more weight
     double points = 0.0;
-    /// The same for messages with solved points only, and the number of these points.
+    /// Like `busy_s` and `points`, but for messages with solved points, and counting only these.
     double solved_busy_s = 0.0;
     double solved = 0.0;
     /// number of points that its pace allowed in the last batch

@@ -199,7 +199,7 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
   return wanted;
 }
 
-/// Adds points or models to a batch if SIMD lanes would be empty and it takes hardly longer.
+/// Adds points or models to a batch if SIMD lanes would be empty and the batch takes hardly longer.
 void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);

@@ -20,7 +20,7 @@ struct BatchSize {
   /// target number; a batch ends with a group if one ends near this number
   std::uint64_t points;
   std::uint64_t groups = 1;       ///< minimum number of groups, if they fit into `most_points`
-  std::uint64_t most_points = 0;  ///< maximum number of points with whole groups; 0: `points`
+  std::uint64_t most_points = 0;  ///< maximum number of points, to complete groups; 0: `points`
   /// Number of falls that the worker solves side by side, which becomes the size of groups if the
   /// study is arranged now. 0 if it must not be arranged, because leases refer to places.
   std::uint64_t falls = 0;
@@ -98,7 +98,7 @@ class StudyPoints {
   /// or is not in the study.
   bool receive(std::uint64_t point);
 
-  /// The same for left-out points. Returns those that were moved.
+  /// Moves received left-out points to committing. Returns the moved points.
   IntervalSet receive(const IntervalSet& left_out);
 
   /// Completes a point whose result is durable. Returns false if the point was not committing.

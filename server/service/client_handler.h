@@ -101,7 +101,7 @@ class ClientHandler {
   /// Returns the client's query or trace with that request number.
   PendingRequests::iterator find(std::string_view identity, std::uint64_t request_id);
   Pending& add(std::uint64_t ticket, const Client& client, Instant now);
-  /// Both remove a request and return the next one.
+  /// Remove a request and return the next request.
   PendingRequests::iterator cancel(PendingRequests::iterator request);
   PendingRequests::iterator refuse(PendingRequests::iterator request, const std::string& reason);
   static protocol::ClientReply find_point(const StudyTable& study, bool is_table_made,

@@ -65,9 +65,9 @@ class Ports {
   virtual void add_peers(protocol::WorkersReply& /*reply*/) const {}
 
   // ---- Other threads.
-  /// `Service::written` is called with the outcome.
+  /// Writes a change. `Service::written` gets the outcome.
   virtual void write(WriteJob job) = 0;
-  /// `Service::query_report` is called with the answer. False if too many queries wait.
+  /// Runs a query. `Service::query_report` gets the answer. Returns false if too many queries wait.
   virtual bool query(QueryJob job) = 0;
   /// Reports that the client has received this number of chunks of its answer.
   virtual void more_rows(std::uint64_t ticket, std::uint64_t received) = 0;
@@ -76,8 +76,8 @@ class Ports {
 
   virtual void log(Severity severity, const std::string& text) = 0;
 
-  // ---- The same for messages.
-  /// Sets the number of the request in `reply`.
+  // ---- Functions that take messages.
+  /// Sends `reply` with the number of the request.
   bool reply(const Client& client, protocol::ClientReply reply);
   bool reply_error(const Client& client, const std::string& message);
   /// Reports to the client that its request waits or runs. Returns false if the client is gone.

@@ -74,7 +74,7 @@ class StudyStates {
   std::optional<StudyId> durable_after(StudyId id) const;
   bool contains(StudyId id) const { return studies_.contains(id); }
   const StudyRecord& record(StudyId id) const { return studies_.at(id); }
-  /// For changes of anything but name and state, which have their own functions.
+  /// Returns the record for changes of anything but name and state, which have their own functions.
   StudyRecord& record(StudyId id) { return studies_.at(id); }
   /// Returns whether the study is neither done nor cancelled.
   bool is_open(StudyId id) const { return unfinished_.contains(id); }

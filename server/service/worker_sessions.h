@@ -81,8 +81,8 @@ class WorkerSessions {
 
   /// Returns the time since a worker's last message [ms].
   using Silence = std::function<std::int64_t(WorkerId)>;
-  /// Sends a HeartbeatReply to workers whose heartbeat is late, and to workers that were sent
-  /// nothing for the same time. Must be called several times a second.
+  /// Sends a HeartbeatReply to workers whose heartbeat is late, and to workers to which
+  /// nothing was sent in that time. Must be called several times a second.
   void tick(const Silence& silent_ms, Instant now);
   /// Returns events that occurred while messages were sent: unreachable or busy workers.
   std::vector<Event> take_events();

@@ -30,7 +30,7 @@ Store::Store(const std::string& path)
   // programs.
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  // SQLite need not overwrite deleted rows with zeros, because that would write many pages.
+  // Does not overwrite deleted rows with zeros, because that would write many pages.
   execute(database, "PRAGMA secure_delete = OFF");
   // Applies to a new file only. Rows waste less space in pages of this size.
   execute(database, "PRAGMA page_size = 8192");

@@ -31,9 +31,10 @@ inline constexpr std::uint32_t kCredit = 1024;
 
 /// Maximum size of messages of all peers that are incomplete or not taken yet.
 inline constexpr std::size_t kHeldInBytes = 512 * kMiB;
-/// The same for one port. Above this size its peers are not read.
+/// Maximum size of such messages at one port. Above it the port's peers are not read.
 inline constexpr std::size_t kHeldInToPauseBytes = 64 * kMiB;
-/// A peer with more unsent output is busy: it gets no batch, and its next request is not read.
+/// A peer with more unsent output than this is busy: it gets no batch, and its requests are not
+/// read.
 inline constexpr std::size_t kBusyBytes = 4 * kMiB;
 inline constexpr std::size_t kAllWaitingOutBytes = 512 * kMiB;
 /// Maximum number of simultaneous handshakes. One source address may have half of them, so that it

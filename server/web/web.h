@@ -57,7 +57,7 @@ class Web {
 
   /// Returns an address such as http://127.0.0.1:7602.
   std::string url() const { return http_.url(); }
-  /// Returns the same address with the page's token.
+  /// Returns the page's address with its token.
   std::string page_url() const { return url() + "/?token=" + page_.token().text(); }
 
   // ---- Called by the event loop.

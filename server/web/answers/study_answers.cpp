@@ -95,7 +95,7 @@ ordered_json model_json(const protocol::Recipe& recipe) {
                     {"unit", key.unit},
                     {"value", key.name == "integrator"
                                   ? ordered_json(solver::integrator_name(model.integrator))
-                                  // JSON then contains null for NaN
+                                  // in JSON, NaN becomes null
                                   : ordered_json(key.get(model))}});
   }
   keys.push_back({{"key", "lengths"}, {"unit", "m"}, {"value", model.lengths_m}});
