@@ -68,7 +68,8 @@ class Notifier {
   void status(const std::string& sentence);
   /// Reports that the program is stopping, and that this may take up to `longest`.
   void stopping(const std::string& sentence, std::chrono::milliseconds longest) const;
-  /// Sends a keep-alive at half of WATCHDOG_USEC. Must be called several times a second.
+  /// Sends a keep-alive each time half of WATCHDOG_USEC has passed. Must be called several times a
+  /// second.
   void feed_watchdog(Clock::time_point now);
 
  private:

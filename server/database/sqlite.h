@@ -122,7 +122,7 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  /// If it fails, rolls back and throws StorageError.
+  /// Commits. If that fails, rolls back and throws StorageError.
   void commit();
 
  private:

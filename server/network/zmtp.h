@@ -40,7 +40,7 @@ class Zmtp {
 
   /// Returns whether a complete message waits. Later bytes are examined after it was taken.
   bool has_message() const { return message_.has_value(); }
-  /// Must be called only if `has_message`.
+  /// Takes the waiting message. There must be one.
   std::string take_message();
 
   /// Expensive work that waits until the caller runs it: a handshake step, about 0.1 ms, or the

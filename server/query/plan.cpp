@@ -404,7 +404,7 @@ void add_condition(Intervals& intervals, SqlTokens tokens) {
   }
 }
 
-/// Splits `tokens` at AND into conditions. Returns them as one condition if AND does not join them.
+/// Splits `tokens` at AND into conditions. Returns a single condition if it is not a conjunction.
 std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   const bool is_in_brackets =
       !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;

@@ -37,7 +37,8 @@ std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   return std::exchange(effects_, {});
 }
 
-/// Passes an event to its handler. Ignores an unknown study or worker if the handler needs it.
+/// Passes an event to its handler. Ignores the event if the handler needs a study or worker that is
+/// unknown.
 template <typename Kind>
 void Scheduler::pass(const Kind& event) {
   if constexpr (requires(Study & study) { on(study, event); }) {
@@ -397,7 +398,7 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
     if (loss && !held.empty()) {
-      // The points that killed one worker may kill the other too, so the other lease keeps the
+      // The points that killed one worker may kill the other too, so the other lease records the
       // loss.
       note_process(lease.study, loss->process);
       twin->second.batch.losses.add({loss->process, false});

@@ -27,9 +27,11 @@ struct SchedulerSettings {
   /// Number of points, or of models' falls, that a thread solves side by side in nearly the time of
   /// a single one. A batch has at least this number per thread, unless that would take too long.
   std::uint64_t lanes = 8;
-  double lanes_batch_s = 10.0;  ///< maximum duration of points that are added to fill lanes
-  double models_batch_s = 1.0;  ///< maximum duration of models that are added to fill lanes
-  std::uint64_t growth = 4;     ///< maximum growth factor from one batch of a worker to the next
+  /// maximum duration of a batch to which points are added to fill lanes
+  double lanes_batch_s = 10.0;
+  /// maximum duration of a batch to which models are added to fill lanes
+  double models_batch_s = 1.0;
+  std::uint64_t growth = 4;  ///< maximum growth factor from one batch of a worker to the next
   /// Number of batches per thread that each new batch leaves for later. So batches shrink toward
   /// the end of a study, and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;

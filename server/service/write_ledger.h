@@ -17,7 +17,7 @@ struct LedgerLimits {
   /// Maximum size of unstored results [bytes]. Above it no message of a worker is read. Above a
   /// quarter of it no batch is sent until half of that quarter is stored.
   std::size_t bytes = limits::kUnstoredBytes;
-  /// Maximum number of unstored results, with the same effect. Many small messages use memory too.
+  /// Maximum number of unstored results, because many small messages use memory too.
   std::size_t writes = limits::kUnstoredWrites;
   /// Maximum number of unstored changes of clients, and maximum size of their recipes [bytes].
   /// Above either limit no change is accepted.

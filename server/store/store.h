@@ -57,8 +57,7 @@ class Store final : public Storage {
   /// Runs `work` in a durable transaction; rolls back if `work` throws. Throws the errors of
   /// `commit`.
   void write(const std::function<void()>& work);
-  /// Returns the connection, for programs that change the file without a server. It has no
-  /// triggers.
+  /// Returns the connection, for programs that change the file without a server. Triggers are off.
   sqlite3* connection() const { return database_.get(); }
 
   /// Returns whether the file was created by this object.
