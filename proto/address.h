@@ -19,8 +19,8 @@ struct Families {
   bool has_v6 = false;
 };
 
-/// Returns the IP versions of a numeric host, or of the addresses that a name has now; neither for
-/// an unknown name. The lookup may take seconds if name servers do not answer.
+/// Returns the IP versions of a numeric host, or of the addresses that a name has now; none for an
+/// unknown name. The lookup may take seconds if name servers do not answer.
 Families families_of(const std::string& host);
 
 }  // namespace oblique::protocol

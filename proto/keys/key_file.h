@@ -81,7 +81,7 @@ bool is_key_name(std::string_view name);
 /// A key that the server admits.
 struct AuthorizedKey {
   std::string name;
-  Role role = Role::kClient;  ///< any role except that of the server
+  Role role = Role::kClient;  ///< any role except that of a server
   CurveKey public_key{};
   std::string added_at;  ///< time in UTC, ISO 8601
 };

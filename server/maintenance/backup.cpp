@@ -80,7 +80,7 @@ bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
 /// unreadable row, skips keys in steps that double, so that a long gap costs few attempts and a
 /// short gap loses few readable rows.
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
-  // This is larger than every key in use.
+  // Maximum step, larger than every key in use.
   constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
   const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
   const std::vector<std::string> found = texts(from, columns_sql);

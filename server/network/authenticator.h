@@ -14,14 +14,14 @@ namespace oblique::server {
 
 /// The reason why a peer is refused or disconnected.
 enum class RefusalCause : std::size_t {
-  kUnknownKey,      ///< its key is not in the list of keys
-  kRevokedKey,      ///< its key was removed from the list while it was connected
-  kOtherRole,       ///< its key is for the other port
-  kWrongServerKey,  ///< it expects a public key that is not the server's key
-  kOtherMechanism,  ///< it has no key but needs one, or has a key while the server has none
+  kUnknownKey,      ///< the peer's key is not in the list of keys
+  kRevokedKey,      ///< the peer's key was removed from the list while it was connected
+  kOtherRole,       ///< the peer's key is for the other port
+  kWrongServerKey,  ///< the peer expects another public key of the server
+  kOtherMechanism,  ///< only one of peer and server has a key
   kBound,           ///< too many connections or handshakes
-  kTooSlow,         ///< it does not finish its handshake in time
-  kFaulty,          ///< it violates the protocol
+  kTooSlow,         ///< the peer does not finish its handshake in time
+  kFaulty,          ///< the peer violates the protocol
 };
 inline constexpr std::size_t kRefusalCauses = 8;
 
@@ -49,7 +49,7 @@ struct KeyIdentity {
 
 /// Outcome of sending a message to a peer.
 enum class Delivery {
-  kSent,  ///< it was sent or queued
+  kSent,  ///< the message was sent or queued
   kBusy,  ///< like kSent, but the peer should get no more work until it reads its output
   kGone,  ///< the peer has disconnected
 };

@@ -183,7 +183,7 @@ struct Network::Peer {
   bool is_paused = false;
   bool is_in_handshake = true;
   std::uint32_t watched_events = 0;  // 0: not in the epoll set
-  std::size_t held_in_bytes = 0;     // its part of the totals
+  std::size_t held_in_bytes = 0;     // value that is included in the totals
   std::size_t waiting_out_bytes = 0;
   std::shared_ptr<const KeyIdentity> key;
 };

@@ -56,7 +56,7 @@ struct Incoming {
 
 struct Disconnect {
   std::string identity;
-  std::string reason;  ///< why the server ended it; empty if the peer disconnected
+  std::string reason;  ///< why the server ended the connection; empty if the peer did
   /// has a value if the peer was not admitted, or if its key was revoked
   std::optional<RefusalCause> refused = {};
   std::string address = {};  ///< such as 10.0.0.3:4711; empty without a reason

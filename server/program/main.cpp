@@ -65,7 +65,7 @@ void take_all_descriptors() {
   }
 }
 
-/// Returns why the text is neither -1 nor an open descriptor, or an empty text.
+/// Returns why the text is not allowed, or "". It must be -1 or an open descriptor.
 std::string descriptor_error(const std::string& text) {
   int fd = -1;
   const bool is_number = CLI::detail::lexical_cast(text, fd);

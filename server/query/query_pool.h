@@ -30,10 +30,10 @@ struct QueryJob {
 
 struct QueueSettings {
   std::size_t readers = limits::kRunningQueries;  ///< maximum number of running queries
-  std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< maximum for one client
+  std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< maximum number per client
   /// maximum number of waiting queries
   std::size_t most_waiting = limits::kWaitingQueries;
-  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< maximum for one client
+  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< maximum number per client
   /// maximum total size of waiting statements [bytes]
   std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;
 };

@@ -189,8 +189,8 @@ void Scheduler::on(const StudyRemoved& event) {
   ready_workers_.unpark_all();  // workers may have waited for suspect points of this study
 }
 
-/// Sets `served` to the smallest value of all studies with this priority, so that a study that
-/// opens neither waits for others nor catches up with them.
+/// Sets `served` to the smallest value of all open studies with this priority, so that a study that
+/// becomes open neither waits for others nor catches up with them.
 void Scheduler::level(Study& study) const {
   const std::int64_t rank = -std::int64_t{study.priority};
   const auto least = free_.lower_bound({rank, 0.0, 0});

@@ -38,7 +38,7 @@ struct StudyCounts {
 
 /// State of a worker. If several apply, the first one counts.
 enum class WorkerState {
-  kSilent,    ///< no message for 1.5 s, although heartbeats come every 900 ms
+  kSilent,    ///< has sent nothing for 1.5 s; heartbeats come every 900 ms
   kSetAside,  ///< gets no batch until it has solved a probe
   kBusy,      ///< does not read its messages
   kWorking,   ///< holds a batch or a probe

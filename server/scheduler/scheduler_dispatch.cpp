@@ -100,7 +100,8 @@ void Scheduler::duplicate_stragglers() {
       }
     }
   }
-  for (const WorkerId id : set_aside) {  // such workers may help after they have solved a probe
+  // workers that are set aside may help after they have solved a probe
+  for (const WorkerId id : set_aside) {
     probe(id, workers_.at(id));
   }
   FastestPaces paces;

@@ -19,8 +19,9 @@ namespace oblique::server {
 struct BatchSize {
   /// target number; a batch ends with a group if one ends near this number
   std::uint64_t points;
-  std::uint64_t groups = 1;       ///< minimum number of groups, if they fit into `most_points`
-  std::uint64_t most_points = 0;  ///< maximum number of points, to complete groups; 0: `points`
+  std::uint64_t groups = 1;  ///< minimum number of groups, if they fit into `most_points`
+  /// maximum number of points if that completes groups; 0: same as `points`
+  std::uint64_t most_points = 0;
   /// Number of falls that the worker solves side by side, which becomes the size of groups if the
   /// study is arranged now. 0 if it must not be arranged, because leases refer to places.
   std::uint64_t falls = 0;

@@ -26,7 +26,7 @@ std::string iso_8601(Instant now);
 struct Client {
   std::string identity;  ///< its connection
   std::uint64_t request_id;
-  std::shared_ptr<const KeyIdentity> holder = {};  ///< its key; null without keys
+  std::shared_ptr<const KeyIdentity> holder = {};  ///< key of the client; null without keys
 
   /// Returns the name of the client's key; empty without keys.
   std::string key() const { return holder == nullptr ? std::string() : holder->name; }

@@ -27,7 +27,8 @@ struct WorkerSessionSettings {
 /// A connected worker, from its WorkerHello.
 struct WorkerRecord {
   std::string identity;
-  AddWorker row;                  ///< its row in the database, stored with its first result
+  /// the worker's row in the database, stored with its first result
+  AddWorker row;
   std::string key;                ///< name of its key; empty without keys
   std::string host;               ///< name of its machine
   std::int64_t last_sent_ms = 0;  ///< time of the last message to it; up to one tick too late

@@ -390,8 +390,8 @@ struct BinSide {
     return fmt::format("max(min(CAST(({} - {}) * {} AS INTEGER), {}), 0)", place, sql_number(first),
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
-  /// Sets ends that the user did not give to the ends of `range`, which is the range of values in
-  /// the column; it is empty if no row has a value. Equal ends make one bin. Throws
+  /// Sets the ends of the axis: those that the user gave, else those of `range`, the range of
+  /// values in the column, which is empty if no row has a value. Equal ends make one bin. Throws
   /// std::invalid_argument for wrong ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));

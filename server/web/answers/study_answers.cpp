@@ -167,8 +167,8 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   return protocol::to_message(model.model());
 }
 
-/// If the study has an H that the tip may not reach, returns the smallest drop [m] that the tip
-/// reaches for certain. Above it only a computed fall gives the answer.
+/// If the study has an H that the tip may not reach, returns the drop [m] up to which every tip is
+/// sure to reach H. Above it only a computed fall gives the answer.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
