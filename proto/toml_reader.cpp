@@ -66,8 +66,7 @@ std::string toml_string(std::string_view text) {
 }
 
 toml::table TomlReader::parse(std::string_view text) const {
-  // messages of toml++ may end with a key, which may have any length
-  constexpr std::size_t kLongestError = 150;
+  constexpr std::size_t kLongestError = 150;  // messages of toml++ may contain long keys
   constexpr std::size_t kMaxKeyParts = 100;
   // The nesting of tables equals the number of parts of their keys, and destructors of tables
   // recurse. This check runs before parsing, so it also counts dots in other text without a comma

@@ -43,8 +43,8 @@ class StopSignals {
   int signal_ = 0;  ///< number of the first signal; 0: none
 };
 
-/// Makes a failed write return an error instead of ending the program, if a pipe has no reader or
-/// the file size limit is exceeded.
+/// Makes a write to a pipe without a reader, or beyond the file size limit, return an error instead
+/// of ending the program.
 void survive_failed_writes();
 
 /// Adds the option --stop-with-parent PID, which sets `parent`.

@@ -301,9 +301,8 @@ class PointTable::BlockPoints : public BlockPlace {
   }
 
   const Block* block_;
-  std::vector<Source> sources_;  ///< one per axis
-  /// each formula comes after the formulas that compute its inputs
-  std::vector<Formula> formulas_;
+  std::vector<Source> sources_;    ///< one per axis
+  std::vector<Formula> formulas_;  ///< each comes after the formulas that compute its inputs
   std::optional<Formula> filter_;
 };
 

@@ -156,8 +156,7 @@ struct StudySize {
   std::uint64_t falls;   ///< number of different falls
   bool falls_estimated;  ///< true if `falls` is estimated from 10^4 random points of more than 10^5
   std::uint64_t bytes;   ///< size of the results in a database [bytes]
-  /// numbers of up to 64 random points that pass the filters
-  std::vector<std::uint64_t> examples;
+  std::vector<std::uint64_t> examples;     ///< up to 64 random points that pass the filters
   std::vector<PassingPoints> blocks = {};  ///< one element per block
 };
 StudySize size_of(const PointTable& table);

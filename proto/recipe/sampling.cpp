@@ -101,8 +101,7 @@ double stratified_fraction(std::uint64_t count, std::uint64_t key, std::uint64_t
 }  // namespace
 
 std::uint64_t hashed(std::uint64_t key, std::uint64_t index) {
-  // 2^64 over the golden ratio, rounded to an odd number
-  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;
+  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;  // 2^64 / golden ratio, an odd number
   return mixed(key + (index + 1) * kGolden);
 }
 
@@ -122,8 +121,7 @@ std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key) {
   for (int depth = 0; depth < kSobolBits; depth += kLevels) {
     const std::uint64_t root = (std::uint64_t{1} << depth) | (bits >> (kSobolBits - depth));
     const std::uint64_t flips = hashed(key, root);
-    // number of the node: 1 is the root of the tree, its children are 2 and 3
-    std::uint64_t node = 1;
+    std::uint64_t node = 1;  // 1 is the root of the tree, with the children 2 and 3
     const int levels = std::min(kLevels, kSobolBits - depth);
     for (int level = 0; level < levels; ++level) {
       const std::uint64_t digit = (bits >> (kSobolBits - 1 - depth - level)) & 1;

@@ -101,8 +101,7 @@ SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,
   const auto name = [](int number) { return "inproc://connections-" + std::to_string(number); };
   int number = 0;
   while (zmq_socket_monitor(socket_.handle(), name(number).c_str(), events) != 0) {
-    // another name is tried while the previous socket with this name is closing
-    if (zmq_errno() != EADDRINUSE) {
+    if (zmq_errno() != EADDRINUSE) {  // the previous socket with this name is closing
       throw zmq::error_t();
     }
     ++number;

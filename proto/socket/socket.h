@@ -18,8 +18,7 @@ struct DealerSettings {
   int shortest_pause_ms = 20;  ///< shortest pause between attempts to connect
   int longest_pause_ms = 1000;
   bool queues_unconnected = true;  ///< if true, accepts messages while it is not connected
-  /// true if it connects to the workers' port, false for the clients' port
-  bool is_worker = false;
+  bool is_worker = false;          ///< true for the workers' port, false for the clients' port
   /// The socket's key and the server's public key. With a key the connection is encrypted and only
   /// that server is accepted. Without a key the connection is plain text.
   std::optional<KeyFile> key = {};

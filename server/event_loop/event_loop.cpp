@@ -21,7 +21,7 @@ constexpr std::chrono::milliseconds kTick{100};
 constexpr std::chrono::milliseconds kLinger{500};
 /// Maximum time for the messages of one port in one turn of the loop.
 constexpr std::chrono::milliseconds kShareOfTurn{5};
-/// After the database is lost, the server answers requests with the reason for this time.
+/// Time after the loss of the database in which the server answers requests with the reason.
 constexpr std::chrono::seconds kFarewell{3};
 /// Maximum time for reading messages that have already arrived when the server ends.
 constexpr std::chrono::milliseconds kLongestLastRead{1000};

@@ -182,8 +182,7 @@ class EventLoop final : private Ports {
 
   const std::chrono::milliseconds drain_;
   const std::function<void(const LoopState&)> on_turn_;
-  /// time until which it drains; nothing if it does not drain
-  std::optional<Clock::time_point> drain_until_;
+  std::optional<Clock::time_point> drain_until_;  ///< nothing if it does not drain
   AccessControl access_;
   Store store_;
   CompletionQueue completions_;

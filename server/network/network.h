@@ -35,7 +35,7 @@ struct NetworkLimits {
   /// A peer with more unsent output than this is busy.
   std::size_t busy_bytes = limits::kBusyBytes;
   std::size_t waiting_out_bytes = limits::kWaitingOutBytes;  ///< maximum unsent output of one peer
-  /// maximum unsent output of all peers
+  /// the same limit for all peers together
   std::size_t all_waiting_out_bytes = limits::kAllWaitingOutBytes;
   std::int64_t handshake_ms = 10'000;  ///< maximum time of a handshake
   /// A connection that had input within this time is not ended to make room for a new one.

@@ -118,8 +118,7 @@ void add_outputs(std::vector<Column>& columns) {
 /// Returns whether a key may have several values over the points of a recipe: only some blocks have
 /// it, or it has several values, an expression or a distribution.
 bool varies(const protocol::Recipe& recipe, std::string_view key) {
-  // the key's axis in the first block; empty if the block has none
-  std::optional<std::string> first;
+  std::optional<std::string> first;  // the axis in the first block; empty if it has none
   for (const auto& block : recipe.blocks()) {
     const auto axis = std::ranges::find(block.axes(), key, &protocol::Axis::key);
     const bool has_axis = axis != block.axes().end();

@@ -11,12 +11,10 @@ namespace oblique::server {
 /// A column of a query, or a member of the object that `solve --json` prints.
 struct Column {
   std::string name;
-  std::string unit;  ///< SI unit; empty for pure numbers and texts
-  std::string kind;  ///< input, output, row (a property of the row), element or function
-  /// path in `solve --json`, such as energy.friction_J; empty if it has none
-  std::string solve_json;
-  /// one line; also gives the allowed values of an input and the sign of an output
-  std::string meaning;
+  std::string unit;        ///< SI unit; empty for pure numbers and texts
+  std::string kind;        ///< input, output, row (a property of the row), element or function
+  std::string solve_json;  ///< path in `solve --json`, such as energy.friction_J; or empty
+  std::string meaning;     ///< one line; with allowed values of an input or sign of an output
   protocol::CellKind values = protocol::CellKind::kText;  ///< kind of all values except NULL
   /// true if the table `results` has the column in the same form as the view `runs`
   bool is_stored = false;

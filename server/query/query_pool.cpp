@@ -275,8 +275,7 @@ struct QueryPool::Running {
 
   std::uint64_t ticket;
   std::int64_t time_limit_ms;
-  /// deadline for the next chunk, or for the client to receive a chunk
-  std::int64_t deadline_ms = 0;
+  std::int64_t deadline_ms = 0;       ///< for the next chunk, or until the client receives one
   std::int64_t answer_ends_ms = 0;    ///< deadline for the whole answer
   std::uint64_t given = 0;            ///< number of reported chunks
   std::uint64_t received_chunks = 0;  ///< number of chunks that the client has received

@@ -23,16 +23,14 @@ namespace oblique::server {
 /// A query of a client.
 struct QueryJob {
   std::uint64_t ticket;  ///< unique
-  /// name of the client's key, or its connection without keys; clients take turns
-  std::string client;
+  std::string client;    ///< name of the client's key, or its connection without keys
   protocol::QueryRequest request;
 };
 
 struct QueueSettings {
   std::size_t readers = limits::kRunningQueries;  ///< maximum number of running queries
   std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< maximum number per client
-  /// maximum number of waiting queries
-  std::size_t most_waiting = limits::kWaitingQueries;
+  std::size_t most_waiting = limits::kWaitingQueries;  ///< maximum number of waiting queries
   std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< maximum number per client
   /// maximum total size of waiting statements [bytes]
   std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;

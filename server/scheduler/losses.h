@@ -33,7 +33,7 @@ struct Loss {
 /// How suspect a point is after losses. Each level includes the conditions of the lower levels.
 enum class Suspicion : std::uint8_t {
   kSound,    ///< may be in a batch of any size with other points
-  kSuspect,  ///< several losses; is leased to a worker that holds nothing else
+  kSuspect,  ///< had several losses; is leased to a worker that holds nothing else
   kRisky,    ///< a single point; a worker was lost while it held only this point
   kFailing   ///< several workers were lost with only this point; it fails unless one returns
 };
@@ -86,10 +86,9 @@ struct WorkerProcess {
   std::set<WorkerId> workers{};  ///< its connections
   /// time at which it first solved leased points; nothing if it has not yet
   std::optional<std::int64_t> proven_since_ms{};
-  std::uint32_t lost_in_a_row = 0;  ///< number of losses since the process last solved a point
-  std::uint64_t losses = 0;         ///< number of its leases that ended without an answer
-  /// studies with points whose loss history may contain this process
-  std::set<StudyId> in_histories{};
+  std::uint32_t lost_in_a_row = 0;   ///< number of losses since the process last solved a point
+  std::uint64_t losses = 0;          ///< number of its leases that ended without an answer
+  std::set<StudyId> in_histories{};  ///< studies with this process in a loss history
 };
 
 /// The processes of all workers, including absent processes that may return.

@@ -227,8 +227,7 @@ void Scheduler::requeue(StudyId id) {
   }
   const bool has_suspect = is_open(study) && study.has_suspect();
   const bool changes_suspect = has_suspect ? suspects_.insert(id).second : suspects_.erase(id) > 0;
-  // other workers may be served now
-  if ((rank && !had_free) || changes_suspect) {
+  if ((rank && !had_free) || changes_suspect) {  // other workers may be served now
     ready_workers_.unpark_all();
   }
 }

@@ -29,8 +29,7 @@ struct StudyCounts {
   std::uint64_t leased;
   bool cancelled;
   std::string solver_version;  ///< version that made its results; empty without results
-  /// true if its open points wait for a server with another solver version
-  bool is_of_other_solver;
+  bool is_of_other_solver;     ///< its open points need another solver version
 
   std::uint64_t open() const { return points - completed; }
   std::uint64_t solved() const { return completed - std::min(completed, failed + left_out); }
@@ -182,10 +181,9 @@ class Scheduler {
     /// Like `busy_s` and `points`, but for messages with solved points, and counting only these.
     double solved_busy_s = 0.0;
     double solved = 0.0;
-    /// number of points that its pace allowed in the last batch
-    std::uint64_t last_batch_points = 0;
-    std::uint64_t last_end = 0;     ///< place at which its last batch ended; 0: no batch yet
-    std::uint64_t held_points = 0;  ///< number of points in its leases
+    std::uint64_t last_batch_points = 0;  ///< points that its pace allowed last
+    std::uint64_t last_end = 0;           ///< place at which its last batch ended; 0: no batch yet
+    std::uint64_t held_points = 0;        ///< number of points in its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
     double s_per_solved() const { return solved > 0.0 ? solved_busy_s / solved : 0.0; }
@@ -195,17 +193,14 @@ class Scheduler {
     std::uint32_t credit = 0;
     bool is_busy = false;  ///< true if it gets no batches
     ProcessNumber process = kNoProcess;
-    /// lease of its probe, which excludes all other leases; 0: none
-    LeaseId probe = 0;
+    LeaseId probe = 0;                        ///< lease of its probe, its only lease then; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< time at which it got its last probe
     std::int64_t last_heard_ms;
-    /// time at which it last stored a point or began to hold batches
-    std::int64_t stored_ms = 0;
+    std::int64_t stored_ms = 0;      ///< when it last stored a point or got its first batch
     std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    /// number of points in the recipe that the worker has, by study
-    std::map<StudyId, std::uint64_t> defined;
+    std::map<StudyId, std::uint64_t> defined;  ///< number of points in its recipe of each study
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;

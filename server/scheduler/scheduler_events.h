@@ -19,24 +19,19 @@ using LeaseId = std::uint64_t;
 struct SchedulerSettings {
   /// A worker counts as lost after this silence: three missed heartbeats. It is noticed within 3 s.
   std::int64_t lost_after_ms = 2800;
-  /// target duration of a batch if the worker's pace is known
-  double batch_target_s = 0.1;
-  /// points per thread in a batch if the worker's pace is unknown
-  std::uint64_t first_batch_points = 4;
+  double batch_target_s = 0.1;                ///< target duration of a batch if the pace is known
+  std::uint64_t first_batch_points = 4;       ///< points per thread if the pace is unknown
   std::uint64_t largest_batch_points = 4096;  ///< maximum number of points per thread in a batch
   /// Number of points, or of models' falls, that a thread solves side by side in nearly the time of
   /// a single one. A batch has at least this number per thread, unless that would take too long.
   std::uint64_t lanes = 8;
-  /// maximum duration of a batch to which points are added to fill lanes
-  double lanes_batch_s = 10.0;
-  /// maximum duration of a batch to which models are added to fill lanes
-  double models_batch_s = 1.0;
-  std::uint64_t growth = 4;  ///< maximum growth factor from one batch of a worker to the next
+  double lanes_batch_s = 10.0;  ///< maximum duration after filling lanes with points
+  double models_batch_s = 1.0;  ///< maximum duration after filling lanes with models
+  std::uint64_t growth = 4;     ///< maximum growth factor from one batch of a worker to the next
   /// Number of batches per thread that each new batch leaves for later. So batches shrink toward
   /// the end of a study, and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
-  /// minimum duration; shorter batches would cost more in transport than they gain
-  double shortest_batch_s = 0.01;
+  double shortest_batch_s = 0.01;  ///< shorter batches cost too much in transport
   /// If no other points can be leased, a batch that takes longer than this, and `straggler_factor`
   /// times as long as expected, is also leased to a second worker. Batches with losses are
   /// excluded.
@@ -62,10 +57,8 @@ struct SchedulerSettings {
   double stall_factor = 10.0;
   std::int64_t shortest_stall_ms = 60'000;
   std::int64_t longest_stall_ms = 3'600'000;
-  /// maximum number of absent processes that are remembered
-  std::size_t most_absent_processes = 4096;
-  /// maximum number of batches that a worker may request at a time
-  std::uint32_t max_credit = limits::kCredit;
+  std::size_t most_absent_processes = 4096;    ///< maximum number of absent processes kept
+  std::uint32_t max_credit = limits::kCredit;  ///< batches that a worker may request at a time
   /// Points per thread in a worker's first batch of a filtered study. The batch is small, because
   /// all of its points may pass the filter.
   std::uint64_t unsolved_batch_points = 256;

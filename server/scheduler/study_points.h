@@ -17,8 +17,7 @@ namespace oblique::server {
 
 /// The size of a batch that a worker wants.
 struct BatchSize {
-  /// target number; a batch ends with a group if one ends near this number
-  std::uint64_t points;
+  std::uint64_t points;      ///< target number; a batch ends with a group near it
   std::uint64_t groups = 1;  ///< minimum number of groups, if they fit into `most_points`
   /// maximum number of points if that completes groups; 0: same as `points`
   std::uint64_t most_points = 0;

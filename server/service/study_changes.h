@@ -17,13 +17,12 @@ namespace oblique::server {
 
 /// A parsed request of a client and, for a submission, the table of its recipe.
 struct ReadRequest {
-  bool is_readable = false;         ///< if false, only the request number is valid
-  std::uint64_t request_id = 0;     ///< 0 if it cannot be read
-  protocol::ClientRequest request;  ///< has no recipe, because that is in `table`
-  StudyTable table;                 ///< set if the recipe is valid
-  std::string recipe_error;         ///< why the recipe is invalid; empty if it is valid
-  /// true if the points of the recipe must still be validated
-  bool needs_point_validation = false;
+  bool is_readable = false;             ///< if false, only the request number is valid
+  std::uint64_t request_id = 0;         ///< 0 if it cannot be read
+  protocol::ClientRequest request;      ///< has no recipe, because that is in `table`
+  StudyTable table;                     ///< set if the recipe is valid
+  std::string recipe_error;             ///< why the recipe is invalid; empty if it is valid
+  bool needs_point_validation = false;  ///< true if its points must still be validated
 };
 
 /// Parses one frame, in time and memory proportional to its size: a long frame that is padded with
@@ -69,8 +68,7 @@ class StudyChanges {
   struct Pending {
     bool grows = false;        ///< true if it adds points
     bool is_complete = false;  ///< true if all earlier points have been completed
-    /// later requests for the study, which wait
-    std::vector<std::function<void(Instant)>> deferred{};
+    std::vector<std::function<void(Instant)>> deferred{};  ///< later requests for the study
   };
   /// A reply to a submission, which waits for the lookup of reusable results.
   struct HeldReply {

@@ -27,8 +27,7 @@ struct WorkerSessionSettings {
 /// A connected worker, from its WorkerHello.
 struct WorkerRecord {
   std::string identity;
-  /// the worker's row in the database, stored with its first result
-  AddWorker row;
+  AddWorker row;                  ///< the worker's row, stored with its first result
   std::string key;                ///< name of its key; empty without keys
   std::string host;               ///< name of its machine
   std::int64_t last_sent_ms = 0;  ///< time of the last message to it; up to one tick too late

@@ -92,8 +92,7 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  /// points that a filter leaves out; they are completed without a row
-  IntervalSet left_out{};
+  IntervalSet left_out{};         ///< points completed without a row
   std::size_t message_bytes = 0;  ///< size of the worker's message [bytes]
 };
 

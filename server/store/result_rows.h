@@ -51,10 +51,9 @@ class ResultInsert {
   void put_lists(const solver::CaseResult& result);
 
   Statement insert_;
-  solver::CaseResult outputs_;  // a member, so that its memory is reused
-  int next_ = 0;                // index of the next parameter to bind
-  // JSON texts of the lists; a member, so that their memory is reused
-  std::array<std::string, 5> lists_;
+  solver::CaseResult outputs_;        // a member, so that its memory is reused
+  int next_ = 0;                      // index of the next parameter to bind
+  std::array<std::string, 5> lists_;  // JSON texts; a member, to reuse their memory
 };
 
 /// Finds and inserts rows of `models`. The key is the model's canonical text

@@ -172,8 +172,7 @@ class Writer {
   CommitCounts counts_;        // guarded by mutex_
   std::size_t left_over_ = 0;  // written by the thread, read after the thread has ended
   std::chrono::steady_clock::time_point clears_from_{};  // used only by the thread
-  // declared last, because it uses the other members
-  std::thread thread_;
+  std::thread thread_;  // declared last, as it uses the other members
 };
 
 }  // namespace oblique::server

@@ -22,8 +22,7 @@ struct WebSettings {
   HttpAddress address;
   /// If true and the address is in use, the server runs without HTTP.
   bool may_be_missing = false;
-  /// allowed host names besides addresses and localhost, in lower case
-  std::set<std::string> names;
+  std::set<std::string> names;  ///< further allowed host names, in lower case
   HttpLimits limits;
   std::string database;  ///< path of the database file
   PageSettings page;

@@ -79,8 +79,7 @@ void ServiceClient::send(protocol::ClientRequest request) {
 }
 
 std::vector<std::string> ServiceClient::take() {
-  // a small number, so that the loop also serves other clients
-  constexpr std::size_t kMaxATurn = 8;
+  constexpr std::size_t kMaxATurn = 8;  // small, so that the loop also serves others
   woken_.clear();
   const std::lock_guard lock(mutex_);
   std::vector<std::string> some;

@@ -95,8 +95,7 @@ ordered_json model_json(const protocol::Recipe& recipe) {
                     {"unit", key.unit},
                     {"value", key.name == "integrator"
                                   ? ordered_json(solver::integrator_name(model.integrator))
-                                  // in JSON, NaN becomes null
-                                  : ordered_json(key.get(model))}});
+                                  : ordered_json(key.get(model))}});  // NaN becomes null
   }
   keys.push_back({{"key", "lengths"}, {"unit", "m"}, {"value", model.lengths_m}});
   return keys;
@@ -307,8 +306,7 @@ class Flow {
   bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;
-  // error to return if the user's condition alone runs without error
-  std::optional<HttpAnswer> error_;
+  std::optional<HttpAnswer> error_;  // set while the user's condition runs alone
 };
 
 }  // namespace

@@ -242,8 +242,7 @@ MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
 }
 
 MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
-  // read before polling, so that a wake during the poll is not lost
-  const std::uint64_t wakes = wakes_;
+  const std::uint64_t wakes = wakes_;  // read first, so that no wake is lost meanwhile
   if (is_stopping_ || (exchange.pending && is_gone(connection))) {
     return MHD_NO;
   }
@@ -318,8 +317,7 @@ ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* i
                               std::size_t most) {
   Stream& stream = *static_cast<Stream*>(context);
   HttpServer& server = stream.server;
-  // read before polling, so that a wake during the poll is not lost
-  const std::uint64_t wakes = server.wakes_;
+  const std::uint64_t wakes = server.wakes_;  // read first, so that no wake is lost
   if (server.is_stopping_ || is_gone(stream.connection)) {
     return MHD_CONTENT_READER_END_WITH_ERROR;
   }

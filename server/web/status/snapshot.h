@@ -36,15 +36,13 @@ struct Snapshot {
   std::array<std::uint64_t, kStudyStates> studies_by_state{};
   /// The first kShownStudies running and paused studies, by descending priority and then by age.
   std::vector<protocol::StudyStatus> studies;
-  /// number of running and paused studies that are not in `studies`
-  std::uint64_t unlisted = 0;
+  std::uint64_t unlisted = 0;                   ///< running and paused studies that are not listed
   std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers workers
   WorkerGroups groups{};                        ///< number of workers in each state
 
   Histogram commit_s{{}};
   std::uint64_t writer_bytes = 0;  ///< size of results that are not durable yet [bytes]
-  /// why the database accepts no results; empty if it accepts them
-  std::string database_fault;
+  std::string database_fault;      ///< why the database takes no results, or empty
   bool is_stopping = false;
   std::array<std::uint64_t, kRefusalCauses> refusals{};  ///< number of refused peers by cause
   QueryCounts queries;
