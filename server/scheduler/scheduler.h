@@ -196,7 +196,7 @@ class Scheduler {
     LeaseId probe = 0;                        ///< lease of its probe, its only lease then; 0: none
     std::optional<std::int64_t> probed_ms{};  ///< time at which it got its last probe
     std::int64_t last_heard_ms;
-    std::int64_t stored_ms = 0;      ///< when it last stored a point or got its first batch
+    std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold leases
     std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
