@@ -77,7 +77,7 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
                             "explicit or generalized-alpha",
                             is_whole<0, static_cast<int>(kIntegratorNames.size()) - 1>),
     key<&Model::spectral_radius>(
-        "spectral_radius", "", "of generalized-alpha at infinite frequency",
+        "spectral_radius", "", "spectral radius of generalized-alpha at infinite frequency",
         ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
         [](double v) { return v >= 0.0 && v < 1.0; }),
     key<&Model::dt_s>("dt", "s", "step in contact; 0: chosen by the tolerance", ">= 0",

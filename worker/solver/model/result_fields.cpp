@@ -223,8 +223,7 @@ constexpr std::array kFields{
         "N s", "impulse of the tangential force, along x; positive: away from the pin"),
     output<&Result::slide_m>(
         kMillimetres,
-        "length of the path of the contact particle P along the ground, there and back "
-        "both counted"),
+        "length of the path of the contact particle P along the ground, in both directions"),
     output<&Result::vt_out_m_s>(
         "m/s", "tangential velocity of the tip at separation, along x; negative: towards the pin"),
     output<&Result::vn_out_m_s>(
@@ -233,10 +232,10 @@ constexpr std::array kFields{
     output<&Result::major_mode>("", "the same with ripples merged"),
     output<&Result::margin>(
         "",
-        "how far the contact kept from another order of events, from 0; near 0 the mode is not "
-        "to be trusted"),
-    output<&Result::margin_event>("",
-                                  "the event that came so near to happening, or to not happening"),
+        "distance of the contact from another order of events, at least 0; near 0 the mode is "
+        "uncertain"),
+    output<&Result::margin_event>(
+        "", "the event that determines margin: it nearly occurred, or nearly did not"),
     output<&Result::stick_total_s>(kMicroseconds, "total time in stick"),
     output("stick_intervals_s", "s",
            "spans in which P does not move: [from, to], counted from touch",
@@ -244,14 +243,13 @@ constexpr std::array kFields{
     output("phases", "s", kPhases.meaning, ListPart{&kPhases}),
     output("reaction_peaks", "s, N", kReactionPeaks.meaning, ListPart{&kReactionPeaks}),
     energy<&Energy::kinetic_in_J>("kinetic energy of the whole finger at touch"),
-    energy<&Energy::friction_J>("energy lost to friction at P; what is lost is positive"),
-    energy<&Energy::restitution_J>(
-        "energy lost in the normal contact element; what is lost is positive"),
+    energy<&Energy::friction_J>("energy lost to friction at P; a loss is positive"),
+    energy<&Energy::restitution_J>("energy lost in the normal contact element; a loss is positive"),
     energy<&Energy::kinetic_change_J>("kinetic energy at separation less that at touch"),
     energy<&Energy::strain_change_J>("strain energy of the links at separation less that at touch"),
     energy<&Energy::gravity_change_J>("potential energy at separation less that at touch"),
-    energy<&Energy::exchanged_J>(
-        "work that the contact forces exchanged with the finger, to and fro both counted"),
+    energy<&Energy::exchanged_J>("work that the contact forces exchanged with the finger, counted "
+                                 "positive in both directions"),
     energy<&Energy::closure>("absolute error of the energy balance, relative to exchanged_J", ""),
     error<&Errors::mode_same>(
         "mode_same",
