@@ -17,7 +17,8 @@
 namespace oblique::client {
 namespace {
 
-/// Elements per link of the coarsest mesh in the study, if no expression defines them.
+/// Returns the elements per link of the coarsest mesh in the study, unless an expression defines
+/// them.
 int coarsest_mesh(const protocol::Recipe& recipe) {
   constexpr int kUnknown = std::numeric_limits<int>::max();
   int coarsest = kUnknown;
