@@ -17,6 +17,6 @@ cmake_path(RELATIVE_PATH CMAKE_SOURCE_DIR BASE_DIRECTORY ${CMAKE_SOURCE_DIR}/${p
 configure_file(${solver_folder}/oblique.pc.in oblique.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/oblique.pc DESTINATION ${pkgconfig_folder} COMPONENT development)
 
-# An example program.
+# The example program for users of the library.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/tests/deploy/consumer
         DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/liboblique-dev/examples COMPONENT development)
