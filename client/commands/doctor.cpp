@@ -49,7 +49,7 @@ struct DoctorFlags {
   SourceFlags source;
 };
 
-/// Collects findings and prints each on a line at once.
+/// Collects findings. Prints each finding at once, on its own line.
 class Diagnosis {
  public:
   explicit Diagnosis(std::ostream& out) : out_(out) {}

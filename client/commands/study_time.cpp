@@ -125,7 +125,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
   const std::vector<FingerPoint> points = points_over(falls, table, size);
   std::vector<std::size_t> begun(cost.threads);
   const double contacts_s = thread_seconds(cost.threads, [&](std::size_t thread) {
-    // Like a worker's batch; solves at least one point per lane.
+    // Time for a batch, as in a worker. A batch has at least one point per lane.
     constexpr std::chrono::milliseconds kBatch{100};
     std::size_t& i = begun[thread];
     for (const auto start = Clock::now();

@@ -100,8 +100,9 @@ struct ContactChange {
 };
 
 /// Returns the differences between the contacts on two levels, turns first, in order of time.
-/// Events of one kind are matched in order; the matching leaves out the pairs that bring the times
-/// of the others closest together. Returns nothing if both have the same events and major peaks.
+/// Events of one kind are matched in order. If one level has more events, the events left out are
+/// those for which the times of the others agree best. Returns nothing if both have the same events
+/// and major peaks.
 std::vector<ContactChange> changes_between(const solver::CaseResult& coarser,
                                            const solver::CaseResult& finer);
 

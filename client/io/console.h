@@ -49,8 +49,8 @@ std::string format_bytes(std::uint64_t bytes);
 
 enum class Verbosity {
   kQuiet,   ///< data and errors
-  kNormal,  ///< also progress and notes
-  kVerbose  ///< also actions, with their places and durations
+  kNormal,  ///< data, errors, progress and notes
+  kVerbose  ///< all that, and actions with places and durations
 };
 
 /// Output streams of a command, its verbosity, and the terminal behind the error stream.

@@ -72,7 +72,7 @@ struct FilePlace {
 };
 
 FilePlace file_place(const std::string& path, std::string_view flag) {
-  constexpr int kMaxLinks = 40;  // the same limit as in Linux
+  constexpr int kMaxLinks = 40;  // Linux follows as many links
   FilePlace place{path};
   std::error_code ignored;
   for (int links = 0; fs::is_symlink(fs::symlink_status(place.path, ignored)); ++links) {

@@ -160,10 +160,11 @@ std::size_t interval_of(const std::vector<double>& edges, double value);
 
 struct AnswerColumn {
   std::string name;
-  std::string unit;                             ///< SI unit; empty: none or unknown
-  std::vector<double> numbers = {};             ///< value of each row; NaN for NULL and texts
-  std::vector<std::string> words = {};          ///< the different texts
-  std::vector<std::uint32_t> word_of_row = {};  ///< index in `words` by row; empty without texts
+  std::string unit;                     ///< SI unit; empty: none or unknown
+  std::vector<double> numbers = {};     ///< value of each row; NaN for NULL and texts
+  std::vector<std::string> words = {};  ///< the different texts
+  /// Index in `words` of each row's text; empty if the column has no text.
+  std::vector<std::uint32_t> word_of_row = {};
   std::unordered_map<std::string, std::uint32_t> number_of_word = {};
   static constexpr std::uint32_t kNoWord = UINT32_MAX;
 
@@ -209,7 +210,7 @@ Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y)
 void mark_filtered(Cells& cells, const Answer& answer);
 
 struct GatheredLines {
-  std::vector<Curve> curves = {};     ///< each with its value of `by`
+  std::vector<Curve> curves = {};     ///< lines, each with its value of `by`
   std::uint64_t gaps = 0;             ///< number of gaps
   std::uint64_t most_at_a_place = 0;  ///< maximum number of rows with a value at one x of a line
 };

@@ -80,13 +80,13 @@ struct Kind {
   std::uint32_t colour;
   int pattern;           ///< gnuplot's number of the pattern; 0: none
   std::string_view ink;  ///< colour of the pattern
-  char letter;           ///< on terminals; pictures show it as a capital
+  char letter;           ///< on terminals; pictures show only capitals
   std::string text;      ///< name in the legend
   std::uint64_t count;   ///< number of points or cells
 
   bool has_capital() const { return std::isupper(static_cast<unsigned char>(letter)) != 0; }
 };
-constexpr int kNoKind = -1;  // cell with a number, or blank cell
+constexpr int kNoKind = -1;  // the cell has a number or is blank
 
 /// Returns the categories, followed by the kinds no result, excluded and failed.
 std::vector<Kind> kinds_of(const Cells& cells) {
@@ -387,7 +387,7 @@ class Script {
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
     add("set key {} maxcols {}\n",
         !is_below  ? "rmargin top vertical"
-        : is_text_ ? "bmargin left horizontal"  // with width -1 letters would overlap
+        : is_text_ ? "bmargin left horizontal"  // width -1 would make letters overlap
                    : "bmargin left horizontal width -1",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {

@@ -23,11 +23,11 @@ namespace {
 using solver::InputError;
 using solver::readable_number;
 
-constexpr std::size_t kMaxCellsAlong = 320;  // with more values on an axis, a cell groups several
+constexpr std::size_t kMaxCellsAlong = 320;  // maximum number of cells along an axis
 constexpr std::size_t kMaxCategories = 12;   // maximum number of categories in the legend
-constexpr std::size_t kMaxNamedLines = 8;    // more lines are coloured by their value instead
-constexpr std::size_t kMaxMarked = 60;       // lines with more points have no marks
-constexpr std::size_t kMaxDots = 4000;       // more points are grouped in cells instead
+constexpr std::size_t kMaxNamedLines = 8;    // maximum number of lines with names in the key
+constexpr std::size_t kMaxMarked = 60;       // maximum number of points on a line with marks
+constexpr std::size_t kMaxDots = 4000;       // maximum number of points drawn one by one
 constexpr std::size_t kMaxNames = 16;        // maximum number of bars for texts
 
 bool is_drawable(double value, bool is_logarithmic) {

@@ -109,7 +109,7 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
 
 void Connection::wait_a_slice(bool to_send) {
   constexpr std::chrono::milliseconds kLongest{50};
-  constexpr std::int64_t kSlices = 5;  // slices within a short timeout
+  constexpr std::int64_t kSlices = 5;  // number of slices of a short timeout
   const auto slice = std::min(std::chrono::milliseconds(settings_.timeout_ms / kSlices), kLongest);
   if (keep_waiting_ && !keep_waiting_()) {
     throw Interrupted("stopped while waiting for the server");

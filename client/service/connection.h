@@ -128,7 +128,7 @@ class Connection : public Source {
     Clock::time_point sent = Clock::now();  ///< time of the last sending; initially the start
     std::uint64_t sent_over = 0;            ///< connection that sent the request; 0: none yet
     Clock::time_point word = {};            ///< time of the last StillWorking message
-    std::optional<bool> runs = {};  ///< its field `runs`: true if the query runs, false if it waits
+    std::optional<bool> runs = {};  ///< field `runs` of that message: the query runs or waits
   };
 
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});

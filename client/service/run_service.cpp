@@ -211,7 +211,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     child.arguments.emplace_back("--allow-network-disk");
   }
   server_ = std::make_unique<ChildProcess>(child);
-  ready.write.close();  // the server has the only other end, so its end closes the pipe
+  ready.write.close();  // only the server keeps this end open, so the pipe closes when it ends
   const auto urls = nlohmann::json::parse(first_line(ready.read, *server_, settings.database, stop),
                                           nullptr, false);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker")) {

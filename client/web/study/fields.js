@@ -1,5 +1,4 @@
-// The parameters (fields) in the address of a study: picture and axes. Replaces missing and
-// unsuitable fields by defaults.
+// The parameters (fields) in the address of a study: picture and axes.
 
 /** The axes of a grid whose values do not follow from other axes. */
 export const ownAxes = (block) =>
@@ -63,7 +62,7 @@ export function pickedColumns({ columns, usual_columns: usual, errors }) {
   ];
 }
 
-/** Fills in the missing fields of an address with defaults. */
+/** Replaces missing and unsuitable fields of an address by defaults. */
 export function fillIn(fields, study) {
   const is = (name) => fields.get(name) ?? "";
   const columnOf = (name) => study.columns.find((one) => one.name === name);

@@ -195,11 +195,11 @@ const steps = {
  */
 export class MapCanvas {
   picture = null;
-  chosen = null; // the cell [column, row]
+  chosen = null; // chosen cell as [column, row]
   chosenPoint = null;
   dragSelects = false;
   #hovered = null;
-  #drag = null; // [x, y, to x, to y] in pixels
+  #drag = null; // dragged rectangle [x, y, to x, to y] in pixels
   #area = null;
 
   constructor(handlers) {

@@ -7,8 +7,8 @@ import { ownAxes } from "./fields.js";
 /**
  * The form of a picture. It has sides x and y. A side has name, unit (SI), values, isWhole (the
  * values between the ends are complete), and either the edges of bins or the indices of the values
- * on their axis. The picture also has z {name, unit, isCategory} and its range least to most;
- * values by rows (for categories indices into the dictionary [{text, cells}]); the head of the
+ * on their axis. The picture also has z {name, unit, isCategory}; `least` and `most`, the range of
+ * z; values by rows (for categories indices into the dictionary [{text, cells}]); the head of the
  * server's answer; point(column, row); whyEmpty(cell), which returns "" or one of emptyKinds; and
  * dots {points, x, y, z} for single points, or labels for lines.
  */

@@ -1,4 +1,4 @@
-# Read by cpack for each kind of package before installing into it.
+# cpack reads this file for each kind of package before it installs files into the package's tree.
 if(CPACK_GENERATOR STREQUAL "DEB")
   # Debian packages use /etc and /usr instead of folders below one prefix.
   set(CPACK_SET_DESTDIR ON)
