@@ -58,7 +58,7 @@ struct AutoscaleFlags {
   SourceFlags source;
 };
 
-/// Finds and submits the Slurm jobs with one name by running `squeue` and `sbatch`.
+/// Finds and submits the Slurm jobs that have a given name. It runs `squeue` and `sbatch`.
 class SlurmJobs {
  public:
   /// A wait for `squeue` ends when `keep_waiting` returns false.

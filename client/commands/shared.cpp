@@ -151,7 +151,7 @@ std::uint64_t print_stream(Console& console, RowStream& stream, const OutputFlag
                            bool in_shown_units, const std::string& way_to_all) {
   const Format format = format_of(flags);
   // Waits for the first part of the answer before opening the output file, so that a failed query
-  // leaves no file.
+  // opens no file.
   protocol::QueryReply chunk = stream.next();
   RowOutput out({.format = format,
                  .file = flags.file,

@@ -50,7 +50,7 @@ std::string format_bytes(std::uint64_t bytes);
 enum class Verbosity {
   kQuiet,   ///< data and errors
   kNormal,  ///< data, errors, progress and notes
-  kVerbose  ///< all that, and actions with places and durations
+  kVerbose  ///< everything, with actions, places and durations
 };
 
 /// Output streams of a command, its verbosity, and the terminal behind the error stream.

@@ -36,8 +36,8 @@ struct FigureAxis {
   /// Sets the range to `values`, extended at both ends by the share `wider_by`. A single value gets
   /// a margin. A range that does not contain 0 is not extended across 0.
   void span(const Range& values, double wider_by = 0.0);
-  /// Position on the axis: 0 at the start of the range, 1 at its end; NaN for values that have
-  /// none.
+  /// Position on the axis: 0 at the start of the range, 1 at its end; NaN if the value has no
+  /// position.
   double share_of(double value) const;
   double value_at(double share) const;
 };

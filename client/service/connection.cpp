@@ -364,7 +364,7 @@ std::vector<protocol::StudyStatus> Connection::status(const std::string& study, 
 protocol::StudyStatus Connection::status_of(std::uint64_t study_id, const std::string& name,
                                             const Tell& tell) {
   protocol::ClientRequest request;
-  request.mutable_status()->set_study(name);  // name for error messages
+  request.mutable_status()->set_study(name);  // the server's error contains it
   request.mutable_status()->set_study_id(study_id);
   const auto reply = call(std::move(request), tell).status();
   if (reply.studies_size() != 1) {

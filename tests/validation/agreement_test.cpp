@@ -27,7 +27,7 @@ struct Output {
   /// Scale of a value: a quantity of the case that all values of the output share, or the value
   /// itself.
   std::function<double(const solver::CaseResult&, double value)> scale;
-  /// False if the number of values depends on ripples
+  /// False if the number of values depends on ripples.
   bool is_headline;
 };
 

@@ -112,8 +112,8 @@ Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlp
 /// Collects the smallest observed order of each part over several runs.
 class SmallestOrders {
  public:
-  /// Adds the order observed in two runs with errors against `right`. The second run has half the
-  /// step of the first.
+  /// Adds the order that follows from the errors of two runs against `right`. The second run has
+  /// half the step of the first.
   void add(const Outcome& at_step, const Outcome& at_half, const Outcome& right) {
     for (std::size_t i = 0; i < kParts.size(); ++i) {
       const auto part = kParts[i].values;

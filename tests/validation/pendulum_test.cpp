@@ -140,8 +140,8 @@ TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
 /// phi.
 double half_period_s(const Motion& motion, const ChainState& start, double dt_s) {
   const auto product = [&](const ChainState& state) {
-    // Computes a^T M b = (|a + b|^2 - |a - b|^2)/4 in the norm of the kinetic energy, without the
-    // factor. a is the transverse displacement, b the mode.
+    // Computes a^T M b, up to a factor, from kinetic energies T: T(a + b) - T(a - b). a is the
+    // transverse displacement, b the mode.
     ChainState sum = start;
     ChainState difference = start;
     // The link lies along x, so transverse positions and slopes are zero at rest.
