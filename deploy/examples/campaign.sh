@@ -1,8 +1,9 @@
 #!/bin/sh
-# Runs a study on a Slurm cluster from its login node: starts a server on this node, and jobs with workers
-# while points are open. After Ctrl-C the same command continues the study.
-# sh campaign.sh STUDY.toml [MOST-JOBS]
-# HOST is the name under which the nodes reach this machine; the database must not be on a network disk.
+# Runs a study on a Slurm cluster from its login node: starts a server on this node, and jobs with
+# workers while points are open. After Ctrl-C the same command continues the study.
+#   sh campaign.sh STUDY.toml [MOST-JOBS]
+# HOST is the name under which the nodes reach this machine. The database must not be on a network
+# disk.
 set -eu
 file=${1:?"sh campaign.sh STUDY.toml [MOST-JOBS]"} most=${2:-4}
 host=${HOST:-$(hostname)}

@@ -19,8 +19,9 @@ GROUPS = {
 }
 VARIED = [0, 2, 1, 1]  # which of H, mu and e
 
-# Tab. 2 [kN] by (H, mu, e): normal forces of all peaks, then tangential forces. The columns of H = 0.96 and
-# 1.04 m are misprinted: they repeat other columns, and the numbers under 1.00 m belong to 1.04 m.
+# Tab. 2 [kN] by (H, mu, e): normal forces of all peaks, then tangential forces. The columns of H =
+# 0.96 and 1.04 m are misprinted: they repeat other columns, and the numbers under 1.00 m belong to
+# 1.04 m.
 PUBLISHED = {
     (1.00, 0.4, 0.6): ([5.07, 1.80, 2.77], [2.03, 0.72, 1.11]),
     (1.00, 0.4, 0.8): ([5.07, 1.73, 2.57], [2.03, 0.70, 1.03]),

@@ -40,8 +40,8 @@ else()
                     oblique-server.conf)
 endif()
 
-# An existing configuration is not overwritten. It is not in the manifest, so removing the files of the
-# manifest keeps it, too.
+# An existing configuration is not overwritten. It is not in the manifest, so removing the files of
+# the manifest keeps it, too.
 if(NOT EXISTS "$ENV{DESTDIR}${configuration}/${part}.toml")
   fill_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
 endif()

@@ -1,5 +1,5 @@
-# Settings of cpack for an archive that runs in any folder, and for Debian packages. deploy/package runs
-# cpack.
+# Settings of cpack for an archive that runs in any folder, and for Debian packages. deploy/package
+# runs cpack.
 set(CPACK_PACKAGE_NAME oblique)
 set(CPACK_PACKAGE_VENDOR oblique)
 set(CPACK_PACKAGE_CONTACT "the oblique authors <maintainers@oblique.example>")
@@ -28,8 +28,8 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 
 include(${CMAKE_CURRENT_LIST_DIR}/descriptions.cmake)
-# Multi-Arch: foreign allows packages of any architecture to depend on this package. cpack has no setting
-# for this field, so the text of the field `Section` contains it as a second line.
+# Multi-Arch: foreign allows packages of any architecture to depend on this package. cpack has no
+# setting for this field, so the text of the field `Section` contains it as a second line.
 set(foreign "science\nMulti-Arch: foreign")
 set(scripts ${CMAKE_CURRENT_BINARY_DIR}/debian)
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME oblique-server)
