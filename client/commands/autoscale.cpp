@@ -121,8 +121,7 @@ std::string installed_script() {
   return std::filesystem::exists(script) ? script.string() : std::string();
 }
 
-/// Throws InputError if the batch script needs a variable that is not set; warns if a key file is
-/// missing.
+/// Throws InputError if the batch script needs an unset variable; warns if a key file is missing.
 void check_variables(Console& console, const AutoscaleFlags& flags, const std::string& script) {
   constexpr const char* kServer = "OBLIQUE_WORKER_SERVER";
   constexpr const char* kKeys = "OBLIQUE_WORKER_KEYS";

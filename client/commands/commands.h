@@ -17,8 +17,7 @@ using protocol::kDone;
 using protocol::kFailed;
 using protocol::kWrongUsage;
 
-/// Carries out the parsed command and returns the exit code. The function is empty until a command
-/// is parsed.
+/// Carries out the parsed command and returns the exit code. Empty until a command is parsed.
 using Action = std::function<int(Console& console)>;
 
 /// A command with its flags. Their variables live as long as the command.

@@ -137,8 +137,7 @@ double cpu_time_s() {
   return static_cast<double>(time.tv_sec) + kNano * static_cast<double>(time.tv_nsec);
 }
 
-/// Measures the processor time [s] per point of the preset `paper` on vector lanes, without the
-/// fall.
+/// Measures the processor time [s] per point of the preset `paper` in lanes, without the fall.
 double measured_point_s() {
   constexpr std::uint64_t kPoints = 600;
   const solver::Finger finger(solver::preset("paper"));
@@ -175,8 +174,7 @@ void check_solver(Diagnosis& diagnosis) {
   }
 }
 
-/// Checks the disk of the database `file`, which need not exist. Returns false if its folder does
-/// not exist.
+/// Checks the disk of the database `file`, which may be missing. False if its folder is missing.
 bool check_disk(Diagnosis& diagnosis, const std::string& file) {
   constexpr const char* kCheck = "disk";
   std::error_code error;

@@ -27,15 +27,13 @@ void add_format_flag(CLI::App& command, std::string& format);
 void add_no_reuse_flag(CLI::App& command, bool& no_reuse);
 void add_network_disk_flag(CLI::App& command, bool& allow);
 
-/// Returns the study that the flags name or define, with all checks done. Throws
-/// solver::InputError.
+/// Returns the study that the flags name or define, fully checked. Throws solver::InputError.
 Study checked_study(Console& console, const StudyFlags& flags);
 
 /// Returns the recipe of a stored study. Throws std::runtime_error if there is no such study.
 protocol::Recipe stored_recipe(Console& console, const SourceFlags& from, const std::string& study);
 
-/// Throws std::runtime_error that names the process and the remedy if a server has the database
-/// open.
+/// Throws std::runtime_error, with process and remedy, if a server has the database open.
 void refuse_used_database(const std::filesystem::path& database);
 
 /// Destination and format of a long answer.

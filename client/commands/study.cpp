@@ -81,8 +81,7 @@ ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block&
   return shown;
 }
 
-/// Describes a block, as "H (4) x mu (40) x e": its axes with their numbers of values, and the
-/// derived keys.
+/// Describes a block as "H (4) x mu (40) x e": axes, their numbers of values, and derived keys.
 std::string made_of(const protocol::Block& block) {
   const std::string_view between = block.zip() || block.has_sample() ? ", " : " x ";
   std::string axes;

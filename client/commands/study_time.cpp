@@ -29,8 +29,7 @@ using Clock = std::chrono::steady_clock;
 using solver::FingerPoint;
 using solver::ModelParameters;
 
-/// Calls `work` with each number below `count`, each on its own thread. Returns the total time of
-/// the calls [s].
+/// Calls `work` with each number below `count` on its own thread. Returns the total time [s].
 double thread_seconds(std::size_t count, const std::function<void(std::size_t)>& work) {
   std::vector<double> each_s(count);
   solver::parallel_for(count, count, [&](std::size_t i) {

@@ -20,8 +20,7 @@ struct StudyCost {
 /// after these falls for one second.
 StudyCost measured_cost(const protocol::PointTable& table, const protocol::StudySize& size);
 
-/// Estimates the time for a study: falls x time of a fall + points x time of a contact, divided by
-/// the number of threads.
+/// Estimates the time [s]: (falls x time of a fall + points x time of a contact) / threads.
 double time_s(const StudyCost& cost, const protocol::StudySize& size);
 
 /// Returns the estimate as "about 15 min on 2 threads". If falls take most of the time, adds which

@@ -77,8 +77,7 @@ protocol::Table full_table(const protocol::WorkersReply& reply) {
   return table;
 }
 
-/// Returns the main columns, in at most 100 characters. Omits the host if the worker's name begins
-/// with it.
+/// Returns the main columns, in at most 100 characters. Omits a host that begins the worker's name.
 protocol::Table table_for_people(const protocol::WorkersReply& reply) {
   constexpr double kMillisecondsASecond = 1000.0;
   const bool has_keys = std::any_of(reply.workers().begin(), reply.workers().end(),

@@ -141,8 +141,7 @@ Extrapolation extrapolate(std::span<const double> values, double highest_order, 
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter) {
   const std::size_t columns = shorter.size() + 1;
-  // cost[i * columns + j] is the minimum cost of matching the first i of `longer` with the first j
-  // of `shorter`.
+  // cost[i * columns + j]: minimum cost of matching the first i of `longer` to j of `shorter`.
   constexpr double kNever = std::numeric_limits<double>::infinity();
   std::vector<double> cost((longer.size() + 1) * columns, kNever);
   cost[0] = 0.0;

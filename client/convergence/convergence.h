@@ -149,8 +149,8 @@ struct OutputConvergence {
 struct PointConvergence {
   std::vector<OutputConvergence> outputs;
   std::vector<ContactChange> changes;  ///< differences between neighbouring levels
-  /// Whether the finest three levels have the same mode, with ripples merged. Only then do outputs
-  /// have a visible limit.
+  /// Whether the finest three levels have one mode, ripples merged. Otherwise outputs have no
+  /// limit.
   bool has_one_mode = false;
 };
 

@@ -46,8 +46,7 @@ std::string text_in(const Descriptor& file, std::size_t from) {
   return text;
 }
 
-/// Returns our environment without the variables that begin with `hidden`; an empty `hidden` keeps
-/// all.
+/// Returns our environment without variables that begin with `hidden`, or all if it is empty.
 std::vector<char*> environment_without(const std::string& hidden) {
   std::vector<char*> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {

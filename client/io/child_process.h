@@ -70,13 +70,11 @@ class ChildProcess {
 
   /// Whether the process ended with exit code 0.
   bool succeeded() const;
-  /// Describes how the process ended: "ended with exit code 1" or "was killed by signal 9
-  /// (Killed)".
+  /// Describes the end: "ended with exit code 1" or "was killed by signal 9 (Killed)".
   std::string ending() const;
   /// Returns the last lines of the child's standard error, if kept.
   std::string last_output() const;
-  /// Returns the child's standard output, if kept. Throws ProcessError if it is longer than
-  /// `most_bytes`.
+  /// Returns the child's standard output, if kept. Throws ProcessError if it exceeds `most_bytes`.
   std::string output(std::size_t most_bytes) const;
 
  private:

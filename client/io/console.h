@@ -18,8 +18,7 @@ struct TerminalSize {
   std::size_t columns = 0;  ///< 0 if the output is not a terminal
   std::size_t lines = 0;    ///< 0 if the output is not a terminal
 };
-/// Returns the size of the terminal behind a descriptor; 80 x 24 if the terminal does not report
-/// its size.
+/// Returns the size of the terminal behind a descriptor; 80 x 24 if it does not report its size.
 TerminalSize terminal_size(int descriptor);
 
 /// Whether the descriptor is a terminal with colours according to TERM, and NO_COLOR is not set.
@@ -87,8 +86,7 @@ class Console {
 
   /// Whether a line of `notes` can be overwritten.
   bool can_redraw() const { return terminal_.is_terminal; }
-  /// Overwrites the last redrawn line of `notes` with `line`; an empty line erases it. Does nothing
-  /// without a terminal.
+  /// Overwrites the last redrawn line of `notes`; an empty line erases it. Only on a terminal.
   void redraw(std::string_view line);
   /// Maximum length of a redrawn line. It leaves the last column free, because some terminals wrap
   /// a line that reaches it.

@@ -73,8 +73,7 @@ std::string progress_line(const ProgressState& state) {
 }
 
 void Progress::update(ProgressState state) {
-  // The rate is averaged over this time: long enough to be steady, short enough to follow workers
-  // that join and leave.
+  // The rate is averaged over this time: steady, but following workers that come and go.
   constexpr double kWindow_s = 10.0;
   const double now_s = state.elapsed_s;
   window_.emplace_back(now_s, state.completed);

@@ -43,8 +43,7 @@ class Progress {
   explicit Progress(Console& console)
       : console_(console), next_s_(console.can_redraw() ? 0.0 : 2.0) {}
 
-  /// Draws the state, at most ten times a second, with the rate of the last seconds. `elapsed_s`
-  /// must not decrease.
+  /// Draws the state and rate, at most ten times a second. `elapsed_s` must not decrease.
   void update(ProgressState state);
 
   /// Draws the last state once more and ends the line.
@@ -61,8 +60,7 @@ class Progress {
 /// change, and erases it at the end. Without a terminal it shows nothing.
 class StatusLine {
  public:
-  /// Returns the text that describes a part. It is called on another thread while the part is
-  /// active.
+  /// Returns the text that describes a part. It is called on another thread.
   using Describe = std::function<std::string()>;
 
   struct Settings {

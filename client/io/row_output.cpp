@@ -80,8 +80,7 @@ FilePlace file_place(const std::string& path, std::string_view flag) {
       refuse(flag, path, ELOOP);
     }
     const fs::path link = fs::absolute(place.path);
-    // Links in /proc, such as the target of /dev/stdout, refer to an open file; the name behind
-    // them does not matter.
+    // Links in /proc, as behind /dev/stdout, refer to open files, whose names do not matter.
     if (fs::weakly_canonical(link.parent_path(), ignored).string().starts_with("/proc/")) {
       place.is_in_place = true;
       return place;
@@ -307,8 +306,7 @@ AtomicFile::AtomicFile(const std::string& path, std::string_view flag) : name_(p
   }
 }
 
-/// Opens an unnamed file where the file system permits it, so that nothing is left if the program
-/// ends early.
+/// Opens an unnamed file where possible, so that nothing remains if the program ends early.
 void AtomicFile::open_draft() {
   draft_ = fmt::format("{}.part-{}", path_, ::getpid());
   descriptor_ = Descriptor(

@@ -16,8 +16,7 @@
 
 namespace oblique::client {
 
-/// The reader of the output, for example `head`, has closed it. This is not a failure and needs no
-/// message.
+/// The reader of the output, for example `head`, has closed it. This is no failure.
 class ClosedPipe : public std::runtime_error {
  public:
   ClosedPipe() : std::runtime_error("the reader of the output has ended") {}
@@ -164,12 +163,10 @@ std::string text_of(const std::vector<protocol::QueryReply>& chunks,
 /// to `print`, and calls `finish`.
 class RowOutput {
  public:
-  /// On a terminal, sets `width` and `first_rows` to its size. Throws solver::InputError if the
-  /// file cannot be created.
+  /// Sets `width` and `first_rows` for a terminal. Throws InputError if the file cannot be created.
   explicit RowOutput(OutputSettings settings);
 
-  /// Throws ClosedPipe if the reader has closed the output, and std::runtime_error if writing
-  /// fails.
+  /// Throws ClosedPipe if the reader closed the output, std::runtime_error if writing fails.
   void print(const protocol::QueryReply& chunk);
   /// Ends the output. A file appears only after this call. Throws the same errors as `print`.
   void finish();
@@ -191,8 +188,7 @@ void print_out(const protocol::Table& rows, Format format);
 void append_number(std::string& out, double value);
 void append_number(std::string& out, std::int64_t value);
 
-/// Appends a field of CSV, quoted if necessary (RFC 4180). An empty text is also quoted, because an
-/// empty field means NULL.
+/// Appends a field of CSV. Quotes it if necessary (RFC 4180) and if it is empty: `""` is not NULL.
 void append_csv_field(std::string& out, std::string_view text);
 
 }  // namespace oblique::client

@@ -97,8 +97,7 @@ std::vector<OwnCases> solved_cases(const PublishedTable& table,
 /// first ripple on. Throws std::runtime_error if a case has several points.
 OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows);
 
-/// Prints the tables: forces, durations, stick times, modes with the differing ones, summary,
-/// misprints.
+/// Prints the tables: forces, durations, stick times, modes, differing modes, summary, misprints.
 void print_comparison(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
 /// Prints only peaks and modes.

@@ -72,8 +72,7 @@ void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   }
 }
 
-/// Adds a diamond for each published end of a phase, on our curve at the end of our phase of the
-/// same number.
+/// Adds a diamond for each published end of a phase, on our curve at the end of the same phase.
 void add_phase_ends(const PaperCase& one, Curve& diamonds) {
   const CaseNumbers own = own_case(*one.history.result);
   double published_s = 0.0;
@@ -131,8 +130,7 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
   return panel;
 }
 
-/// Creates a figure with a column of panels for each group, two groups per row, lettered as in the
-/// paper.
+/// Creates a figure: a column of panels per group, two groups per row, lettered as in the paper.
 Figure over_time(const PaperGroups& groups, const std::string& title, const std::string& subtitle,
                  double panel_height, const std::vector<PanelPlan>& plans) {
   Figure figure{

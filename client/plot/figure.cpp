@@ -26,8 +26,7 @@ Range around(double value, bool is_logarithmic) {
   return is_logarithmic ? Range{value / 1.25, value * 1.25} : Range{value - half, value + half};
 }
 
-/// Label of a quantity: its symbol with a name, else the first words of its description, else its
-/// name.
+/// Label of a quantity: its symbol with a name, else the start of its description, else its name.
 std::string label_of(const std::string& name) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kSymbols{{
       {"H", "drop H"},
@@ -50,8 +49,7 @@ std::string label_of(const std::string& name) {
   return name;
 }
 
-/// Returns bin edges at multiples of 1, 2 or 5 times a power of ten: about `bins` bins that cover
-/// the range.
+/// Returns about `bins` bin edges around the range, at multiples of 1, 2 or 5 times a power of ten.
 std::vector<double> round_edges(const Range& range, double bins) {
   const double raw = (range.to - range.from) / bins;
   const double decade = std::pow(10.0, std::floor(std::log10(raw)));

@@ -36,8 +36,7 @@ struct FigureAxis {
   /// Sets the range to `values`, extended at both ends by the share `wider_by`. A single value gets
   /// a margin. A range that does not contain 0 is not extended across 0.
   void span(const Range& values, double wider_by = 0.0);
-  /// Position on the axis: 0 at the start of the range, 1 at its end; NaN if the value has no
-  /// position.
+  /// Position on the axis, from 0 at its start to 1 at its end; NaN if the value has no position.
   double share_of(double value) const;
   double value_at(double share) const;
 };
@@ -93,8 +92,7 @@ struct CellAxis {
   std::vector<double> edges = {};   ///< edges of the cells: one more than values
 };
 
-/// Cells of a map, row by row from the lowest. If the cells have categories, the values are
-/// category numbers.
+/// Cells of a map, row by row from the lowest. With categories, values are category numbers.
 struct Cells {
   std::string name = {};  ///< column that gives the values
   CellAxis x = {};
@@ -205,8 +203,7 @@ struct Gathered {
 /// averaged; for text the most frequent value is taken. Cells without a row have no result.
 Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y);
 
-/// Marks a cell without a row as excluded by the condition if `answer`, with columns x and y, has a
-/// row in it.
+/// Marks cells without a result as excluded by the condition if `answer` (x, y) has a row for them.
 void mark_filtered(Cells& cells, const Answer& answer);
 
 struct GatheredLines {

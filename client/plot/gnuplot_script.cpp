@@ -138,8 +138,7 @@ int kind_of(const Cells& cells, std::size_t cell) {
                                          : kNoKind;
 }
 
-/// A panel divided into equal parts, row by row from below. Each part refers to the cell that
-/// contains its middle.
+/// A panel in equal parts, row by row from below. Each part refers to the cell at its middle.
 struct Raster {
   std::size_t columns;
   std::size_t rows;
@@ -319,7 +318,7 @@ class Script {
     if (is_text_) {
       label({figure_.title}, x, y, "");
     } else {
-      // Bold letters need gnuplot's enhanced text. A backslash keeps its special characters
+      // Bold letters need gnuplot's enhanced text. A backslash makes its special characters
       // literal.
       const auto title = gnuplot_text(marked(protocol::visible(figure_.title), "\\_^{}@&~", '\\'));
       add("set label '{{/:Bold*1.25 {}}}' at {} left\n", title.substr(1, title.size() - 2),
@@ -360,8 +359,7 @@ class Script {
     }
   }
 
-  /// Width, in letters, of the numbers or names to the left of the panels. All panels share the
-  /// maximum.
+  /// Width, in letters, of the numbers or names left of the panels: the maximum of all panels.
   double left_letters() const {
     std::size_t longest = 10;
     for (const Panel& panel : figure_.panels) {

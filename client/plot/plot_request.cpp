@@ -64,8 +64,7 @@ StudyShape shape_of_block(const protocol::Recipe& recipe, std::size_t number,
   return shape;
 }
 
-/// Returns the shape with the axes of all blocks, each with the values that any block gives to its
-/// key.
+/// Returns the shape with the axes of all blocks, each with the values that any block gives it.
 StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   shape.is_one_block = false;
   for (const Block& block : recipe.blocks()) {
@@ -99,8 +98,7 @@ double nearest_value(const StudyAxis& axis, double wanted) {
   });
 }
 
-/// Whether a typed value means `value` of an axis. Six equal digits suffice, because tables show no
-/// more.
+/// Whether a typed value means `value` of an axis. Tables show six digits, so these must agree.
 bool means(double typed, double value) {
   return std::abs(value - typed) <= 1e-5 * std::abs(typed);
 }

@@ -36,12 +36,10 @@ struct PlotRequest {
   std::string range{};  ///< "FROM:TO"
 };
 
-/// Checks all flags that can be checked without the study. Throws solver::InputError that names the
-/// flag.
+/// Checks all flags as far as possible without the study. Throws solver::InputError with the flag.
 void check(const PlotRequest& request);
 
-/// The range of --range; nothing if it is not given. Throws solver::InputError for an invalid
-/// range.
+/// The range of --range; nothing if not given. Throws solver::InputError for an invalid range.
 std::optional<Range> range_given(const PlotRequest& request);
 
 std::pair<std::string, std::string> scatter_columns(const PlotRequest& request);

@@ -176,8 +176,7 @@ class FigureBuilder {
     return made;
   }
 
-  /// Sets the range of the colour scale from --range, else from the values; adds a note if values
-  /// lie outside.
+  /// Sets the range of the colours from --range or the values; adds a note if values lie outside.
   void set_colours(FigureAxis axis, const std::vector<double>& values) {
     axis.is_logarithmic = request_.is_colour_logarithmic;
     const Range all = range_of(values, axis.is_logarithmic);
@@ -257,8 +256,7 @@ class FigureBuilder {
     return gather_scattered(answer, static_cast<std::size_t>(std::clamp(side, 8.0, 320.0)));
   }
 
-  /// Groups points in cells of equal size, at most `most` along an axis. Empty cells are not marked
-  /// as missing points.
+  /// Groups points in equal cells, at most `most` along an axis. Empty cells are not marked.
   Gathered gather_scattered(const Answer& answer, std::size_t most) const {
     // An axis with few different values, such as those of a grid, gets fewer cells than values;
     // otherwise empty cells would form stripes.

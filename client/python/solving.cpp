@@ -47,8 +47,7 @@ class ResultArrays {
  public:
   explicit ResultArrays(std::size_t points);
 
-  /// Stores the result of one point. Not thread-safe; must be called without the interpreter's
-  /// lock.
+  /// Stores the result of one point. Not thread-safe; call it without the interpreter's lock.
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 

@@ -227,8 +227,7 @@ void Connection::check(const protocol::ClientReply& reply, int kind) const {
   if (reply.has_error()) {
     throw ServerError(reply.error().message());
   }
-  // A reply has the same kind number as its request. Messages of other programs may decode as any
-  // kind.
+  // A reply has the kind number of its request. Messages of other programs may decode as any kind.
   if (static_cast<int>(reply.kind_case()) != kind) {
     throw ConnectionError(
         fmt::format("the reply from {} is not that of an oblique-server to a client: check the "

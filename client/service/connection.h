@@ -31,8 +31,7 @@ struct ConnectionSettings {
   /// with each repetition.
   std::int64_t resend_after_ms = 3'000;
   std::optional<protocol::KeyFile> key = {};  ///< our key; nothing: the connection is not encrypted
-  /// Advice in the error if the server does not answer. If empty, the error says that the server
-  /// may not run.
+  /// Advice if the server does not answer. If empty, the error says that the server may not run.
   std::string if_silent = {};
 };
 
@@ -97,8 +96,7 @@ class Connection : public Source {
   protocol::WorkersReply workers();  ///< all workers
 
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
-  /// Waits as long as the server reports that it works on the trace. The server enforces the time
-  /// limit.
+  /// Waits as long as the server reports that it works on the trace. The server limits the time.
   protocol::TraceReply trace(protocol::TraceRequest trace);
   /// Changes the study called `study`. Renaming and deleting also need its number.
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change,
@@ -153,8 +151,7 @@ class Connection : public Source {
   void send_or_connect_again(Outstanding& outstanding);
   /// Waits for the next message or connection, at most for one time slice.
   void wait_a_slice(bool to_send);
-  /// Returns the next message from the server if it answers request `request_id` or is
-  /// StillWorking.
+  /// Returns the next message from the server if it answers this request or is StillWorking.
   std::optional<protocol::ClientReply> received(std::uint64_t request_id);
 
   ConnectionSettings settings_;

@@ -37,8 +37,7 @@ using Clock = std::chrono::steady_clock;
 
 // Startup takes long for a large database, because the server first reads its completed points.
 constexpr std::chrono::seconds kReadyWithin{60};
-// Before it ends, a worker finishes its point, which takes long on fine meshes, and the server
-// commits.
+// Before it ends, a worker finishes its point (slow on fine meshes), and the server commits.
 constexpr std::chrono::seconds kStopWithin{5};
 constexpr std::chrono::milliseconds kPause{1};
 

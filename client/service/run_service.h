@@ -77,8 +77,7 @@ class EmbeddedService {
   void check();
   /// Returns the last output of workers that ended since the previous call, or an empty text.
   std::string news();
-  /// Ends the workers, then the server, which first stores their results. Kills processes that do
-  /// not end in time.
+  /// Ends the workers, then the server, which first stores their results. Kills slow processes.
   void stop();
 
  private:
@@ -108,8 +107,7 @@ struct RunSettings {
 /// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `command`.
 void add_worker_flags(CLI::App& command, RunSettings& settings);
 
-/// Throws solver::InputError, with the flag and the allowed values, for a wrong number of workers
-/// or rows.
+/// Throws solver::InputError, with the flag, for a wrong number of workers or rows.
 void check_settings(const RunSettings& settings);
 
 struct RunEnd {

@@ -14,8 +14,7 @@
 namespace oblique::client {
 namespace {
 
-/// Returns the result of `call`. Turns a StatementError into InputError, because the user wrote the
-/// statement.
+/// Returns the result of `call`. Turns a StatementError into InputError: users write statements.
 template <class Call>
 auto answered(const Call& call) {
   try {

@@ -22,8 +22,7 @@ struct DatabaseSettings {
 struct ResultQuery {
   std::string study = {};
   std::string where = {};  ///< empty: all points
-  /// Columns. If empty: the axes that vary and the main outputs; with `group`, columns for each
-  /// group.
+  /// Columns. Empty: the axes that vary and the main outputs; with `group`, columns per group.
   std::string select = {};
   std::string group = {};                  ///< columns to group by; empty: no groups
   std::string order = {};                  ///< empty: by point; with `group`, by its columns
@@ -68,8 +67,7 @@ class Source {
   /// std::runtime_error, which contains `name`, if the study does not exist.
   virtual protocol::StudyStatus status_of(std::uint64_t study_id, const std::string& name,
                                           const Tell& tell);
-  /// StatusReply.access of the last status, which describes who may use the server; empty for a
-  /// file.
+  /// StatusReply.access of the last status: which peers may connect; empty for a file.
   virtual std::string access() const { return {}; }
   /// Name of the source in messages: "oblique.db" or "tcp://127.0.0.1:7600".
   virtual std::string place() const = 0;

@@ -50,8 +50,7 @@ protocol::StudyStatus study_named(Source& source, const std::string& name, const
 class FollowedStudy {
  public:
   FollowedStudy(Source& source, std::string name) : source_(source), name_(std::move(name)) {}
-  /// Reports a new name of the study to `tell`. Throws the errors of `study_named` and
-  /// Source::status_of.
+  /// Reports a new name of the study to `tell`. Throws as `study_named` and Source::status_of do.
   protocol::StudyStatus status(const Tell& tell);
 
  private:
@@ -65,8 +64,7 @@ class FollowedStudy {
 int print_end(Console& console, const protocol::StudyStatus& status,
               const std::function<protocol::Table(const std::string&)>& query);
 
-/// Warns on standard error if `access` (StatusReply.access) states that the server at `place` is
-/// insecure.
+/// Warns on standard error if the server at `place` is insecure; `access` is StatusReply.access.
 void warn_if_insecure(Console& console, const std::string& access, const std::string& place);
 
 /// Returns "12 points reused: 7 from a, 5 from b", or an empty text if no points were reused.

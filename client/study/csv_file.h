@@ -44,8 +44,7 @@ class CsvFile {
   };
   void read_rows(std::string_view text);
   void check_names() const;
-  /// Calls `read` with each field of a column. Adds the field's place to InputErrors that `read`
-  /// throws.
+  /// Calls `read` with each field of a column. Adds the field's place to InputErrors from `read`.
   void read_column(std::string_view column,
                    const std::function<void(std::string_view field)>& read) const;
   [[noreturn]] void fail(std::size_t line, std::string_view message) const;
@@ -59,8 +58,8 @@ class CsvFiles {
  public:
   /// Relative paths start at `folder`.
   explicit CsvFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  /// Returns the file. Throws InputError as CsvFile does, and if `path` is not a regular file of at
-  /// most 64 MiB.
+  /// Returns the file. Throws InputError as CsvFile does, and unless it is regular and has <= 64
+  /// MiB.
   const CsvFile& at(const std::string& path);
 
  private:

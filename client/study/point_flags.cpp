@@ -127,8 +127,7 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   return written;
 }
 
-/// Whether a text is NAME(...), where NAME is a distribution or, in a sample, any name that is not
-/// a function.
+/// Whether a text is NAME(...) with a distribution or, in a sample, any name but a function's.
 bool is_distribution(std::string_view text, BlockKind kind) {
   const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
   const auto functions = expressions::function_names();
@@ -141,8 +140,7 @@ bool is_distribution(std::string_view text, BlockKind kind) {
   return is_call && (is_in(distributions) || (kind == BlockKind::kSample && !is_in(functions)));
 }
 
-/// Whether a text that is not a list of numbers is an expression: it contains an operation or
-/// another key.
+/// Whether a text contains an operation or another key, and is not a list of numbers.
 bool is_expression(std::string_view text) {
   const auto parts = protocol::split(text, ',');
   return !std::all_of(parts.begin(), parts.end(),

@@ -273,8 +273,7 @@ class BlockReader {
         whole("count"), parts.contains("seed") ? whole("seed") : protocol::kUsualSeed);
   }
 
-  /// Adds the axes from the file `csv`: the columns named by `columns`, or all columns under their
-  /// own names.
+  /// Adds axes from the file `csv`: the columns named by `columns`, or all under their own names.
   void add_columns(std::vector<protocol::Axis>& axes) const {
     const auto* node = table_.get("csv");
     const auto* columns = table_.get("columns");

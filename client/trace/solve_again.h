@@ -28,8 +28,7 @@ namespace oblique::client {
 /// console must outlive the function.
 ReachCheck tip_reach(Console& console);
 
-/// Returns the largest drop [m] of the tip. Solves the fall if necessary and shows its progress on
-/// `line`.
+/// Returns the largest drop [m] of the tip. If it solves the fall, shows the progress on `line`.
 double largest_drop_m(const solver::Finger& finger, StatusLine& line);
 
 /// A point that this process solves.

@@ -72,8 +72,7 @@ function submissionOf(form) {
   if (name === "") throw new Error("the study needs a name");
   const sample = sampleOf(form.sample);
   const axis = ([key, text]) => axisOf(key, text, sample !== undefined);
-  // Single values belong to the model, as with flags. Axes of model keys come first, sorted by
-  // name.
+  // Single values belong to the model, as with flags. Axes of model keys come first, by name.
   const others = otherKeys(form).map(axis);
   const isSingle = (one) => one.values?.length === 1 && !/^length\d/.test(one.key);
   const varied = others.filter((one) => !isSingle(one)).sort((a, b) => (a.key < b.key ? -1 : 1));

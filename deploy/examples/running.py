@@ -13,8 +13,7 @@ import pandas
 from matplotlib import pyplot
 
 file, study = sys.argv[1:3]
-# Opens the file read-only. The server continues to write; each connection sees the state at one
-# instant.
+# Opens the file read-only. The server keeps writing; each connection sees the state at one instant.
 database = sqlite3.connect(f"file:{file}?mode=ro", uri=True)
 
 

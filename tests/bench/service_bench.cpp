@@ -188,8 +188,7 @@ void bench_worker_killed(std::uint64_t points) {
               solved_s - std::chrono::duration<double>(killed).count());
 }
 
-/// Measures the time from killing and restarting the server until results of both workers are
-/// stored.
+/// Measures the time from killing and restarting the server until both workers' results are stored.
 void bench_server_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker one(study.folder, study.server.worker_url());

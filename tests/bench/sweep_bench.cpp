@@ -64,8 +64,7 @@ void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::St
                             steps.contact(point.e_star), fall.state_at(point.H_m), {}));
 }
 
-/// Builds the model and solves the fall again for every point, without vector lanes, as a simple
-/// script would.
+/// Builds the model and solves the fall for every point, without lanes, as a simple script would.
 void naive(benchmark::State& bench) {
   const std::vector<Point> points = sweep();
   std::size_t next = 0;
@@ -164,8 +163,7 @@ void distinct_contacts(benchmark::State& bench) {
 }
 BENCHMARK(distinct_contacts)->ArgName("drops")->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond);
 
-/// Every point has its own E, I and lengths, and so its own fall. There are twice as many points as
-/// lanes.
+/// Every point has its own E, I and lengths, and so its own fall. Twice as many points as lanes.
 void distinct_chains(benchmark::State& bench) {
   const std::size_t cases = 2 * solver::runnable_lane_kernels().front().lanes;
   int round = 0;

@@ -50,8 +50,7 @@ bool is_taken(const std::string& condition) {
   }
 }
 
-/// Checks that an accepted condition has no effect outside its brackets: the query must give no
-/// row.
+/// Checks that an accepted condition has no effect outside its brackets: there must be no row.
 void expect_no_row(oblique::server::Reader& database, const std::string& condition) {
   const auto reply =
       database.query("SELECT 1 FROM (SELECT 1 AS point, 0.4 AS mu, 0.9 AS e) WHERE (" + condition +
@@ -91,8 +90,7 @@ void ask(sqlite3* database, const std::string& text) {
 
 }  // namespace
 
-/// Checks that a condition, as after --where, gives an answer or a QueryError and never changes the
-/// database.
+/// Checks that a condition gives an answer or a QueryError and never changes the database.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Opened& files = opened();
   const std::string condition(reinterpret_cast<const char*>(data), size);

@@ -24,8 +24,7 @@ struct Output {
   std::string name;
   std::string relative_to;
   std::function<std::vector<double>(const solver::CaseResult&)> values;
-  /// Scale of a value: a quantity of the case that all values of the output share, or the value
-  /// itself.
+  /// Scale of a value: a quantity that all values of the output share, or the value itself.
   std::function<double(const solver::CaseResult&, double value)> scale;
   /// False if the number of values depends on ripples.
   bool is_headline;

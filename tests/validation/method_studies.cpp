@@ -275,8 +275,7 @@ struct StepErrors {
   std::int64_t grazing = 0;      ///< excluded points, whose mode differs between the steps
 };
 
-/// Returns variations of the preset `paper`: mesh, contact stiffness, restitution, tip mass and
-/// lengths.
+/// Returns variations of the preset `paper`: mesh, contact stiffness, e*, tip mass and lengths.
 std::vector<StepCase> step_cases() {
   const auto model = solver::preset("paper");
   std::vector<StepCase> cases;

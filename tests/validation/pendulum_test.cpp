@@ -60,8 +60,7 @@ Swing swing(const Motion& motion, double dt_s, int steps) {
   return result;
 }
 
-/// Returns the first time at which `value` falls below zero, located by varying the length of the
-/// last step.
+/// Returns the first time at which `value` is below zero, located by varying the last step.
 double first_zero_s(const Motion& motion, ChainState state, double dt_s,
                     const std::function<double(const ChainState&)>& value) {
   ChainState next = state;
@@ -105,8 +104,7 @@ TEST(Pendulum, ConservesItsEnergyWithBothIntegrators) {
 }
 
 TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
-  // A uniform rod released from the horizontal is a pendulum of length 2L/3 with an amplitude of 90
-  // degrees.
+  // A uniform rod released from the horizontal is a pendulum of length 2L/3, amplitude 90 degrees.
   ModelParameters model = pendulum();
   const double quarter_s = std::sqrt(2.0 * model.lengths_m.front() / (3.0 * model.g_m_s2)) *
                            std::comp_ellint_1(std::sqrt(0.5));

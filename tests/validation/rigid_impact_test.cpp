@@ -105,8 +105,7 @@ TEST(RigidImpact, WorkOfRestitutionIsMinusTheSquareOfTheRestitutionTimesThatOfCo
                   "Stronge's definition of e*", largest, 1e-12, "exact; rounding"});
 }
 
-/// Two links so stiff that they impact like rigid links: W = J M^-1 J^T, with the angles as
-/// coordinates.
+/// Two links so stiff that they impact like rigid ones: W = J M^-1 J^T, with angles as coordinates.
 struct StiffLinks {
   static constexpr double kLength_m = 0.4;
   static constexpr double kAngle_rad[2] = {-0.3, -1.2};
@@ -142,8 +141,7 @@ struct StiffLinks {
   solver::ChainState state(const solver::Chain& chain, const Eigen::Vector2d& V_m_s) const {
     const Eigen::Vector2d rate = J.inverse() * V_m_s;
     solver::ChainState state = chain.at_rest();
-    // Rows of q: pin, slope; outer slope of the inner link, joint, slope of the outer link; tip,
-    // slope.
+    // Rows of q: pin, slope; inner link's end slope, joint, outer link's first slope; tip, slope.
     const Eigen::Index link_of[7] = {0, 0, 0, 0, 1, 1, 1};
     const bool is_slope[7] = {false, true, true, false, true, false, true};
     const Eigen::Vector2d joint_m = J.col(0).reverse().cwiseProduct(Eigen::Vector2d(1.0, -1.0));

@@ -39,8 +39,7 @@ ModelParameters link(double length_m, int elements) {
   return model;
 }
 
-/// Returns a horizontal link that rotates about its pin, so that the tip moves down at V0. All
-/// waves start at the tip.
+/// Returns a horizontal link that rotates about its pin. Its tip, where waves start, has V0 down.
 ChainState turning(const Chain& chain, double length_m) {
   ChainState state = chain.at_rest();
   state.v.row(1) = -kV0_m_s / length_m * state.q.row(0);
@@ -59,8 +58,7 @@ ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   return state;
 }
 
-/// Returns the largest difference between the contact force and `right` in [0, duration_s], divided
-/// by `scale_N`.
+/// Returns the largest difference between contact force and `right`, divided by `scale_N`.
 double force_error(const Motion& motion, const solver::AffineContactForce<double>& force,
                    ChainState state, double dt_s, double duration_s, double scale_N,
                    const std::function<double(double)>& right) {

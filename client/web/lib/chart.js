@@ -1,5 +1,4 @@
-// Draws lines or bars over an axis with uPlot. Keys move the cursor; a text shows the values at the
-// cursor.
+// Draws lines or bars over an axis with uPlot. Keys move the cursor; a text shows its values.
 import { ink } from "./colours.js";
 import { h } from "./dom.js";
 import { shown } from "./format.js";

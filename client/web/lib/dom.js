@@ -43,10 +43,7 @@ export const labelled = (name, field, help) =>
 export const button = (text, onclick, settings = {}) =>
   h("button", { type: "button", onclick, ...settings }, text);
 
-/**
- * Creates a list to pick from. Choices are [value, text, group] or plain values; the group is
- * optional.
- */
+/** Creates a list to pick from. Choices are [value, text, optional group] or plain values. */
 export function picker(choices, chosen, pick) {
   const select = h("select", { onchange: () => pick(select.value) });
   let parent = select;

@@ -31,10 +31,7 @@ export function shownUnit(name, unit) {
   return [unit === "1" ? "" : (unit ?? ""), 1];
 }
 
-/**
- * Returns the name of a column or axis with its shown unit. Omits the unit if the name ends with
- * it.
- */
+/** Returns the name of a column or axis with its shown unit, unless the name ends with the unit. */
 export function heading(name, unit) {
   const [text, factor] = shownUnit(name, unit);
   const suffix = `_${text.replace("/", "_").replaceAll(" ", "")}`;

@@ -42,8 +42,7 @@ function usualAxes(keys) {
 }
 
 /**
- * Returns the columns of a study for pickers as [name, group]: first those that vary, then the main
- * outputs.
+ * Returns the columns of a study for pickers, [name, group]: those that vary, then main outputs.
  */
 export function pickedColumns({ columns, usual_columns: usual, errors }) {
   const isDrawn = (name) => columns.some((one) => one.name === name && one.picture !== "none");

@@ -1,5 +1,4 @@
-// Legends of pictures: a colour bar with its range, or a list of categories, and the kinds of empty
-// cells.
+// Legends of pictures: a colour bar or a list of categories, and the kinds of empty cells.
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
 import { count, counted, heading, withUnit } from "../lib/format.js";

@@ -27,10 +27,7 @@ const mostForMedians = 100_000;
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
-/**
- * Returns the indices of the axis values that the server includes when it shows only `shown` of
- * them.
- */
+/** Returns the indices of the values of an axis that the server sends, `shown` in number. */
 function numbersOf({ first, last }, shown) {
   const steps = Math.max(shown - 1, 1);
   const number = (i) => first + Math.floor((2 * i * (last - first) + steps) / (2 * steps));

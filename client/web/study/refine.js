@@ -3,10 +3,7 @@ import { post } from "../api.js";
 import { button, h, labelled } from "../lib/dom.js";
 import { count } from "../lib/format.js";
 
-/**
- * Minimum number of steps along a refined axis. A refined axis has at least twice as many steps as
- * before.
- */
+/** Minimum number of steps along a refined axis, which has at least twice as many as before. */
 const leastSteps = 64;
 
 const integrators = ["explicit", "generalized-alpha"];

@@ -1,5 +1,4 @@
-// The table of the shown points: those that meet filter and selection and lie in the shown part. It
-// has pages.
+// The table of the shown points, in pages: those in the shown part that meet filter and selection.
 import { rows, rowsPath } from "../api.js";
 import { button, h, setChildren } from "../lib/dom.js";
 import { count, heading, shown, shownUnit } from "../lib/format.js";
@@ -143,10 +142,7 @@ export class PointTable {
     this.view.set({ page: page > 1 ? String(page) : "" });
     this.load();
   }
-  /**
-   * Sorts by a column. Repeated calls switch from ascending to descending, then back to the order
-   * of points.
-   */
+  /** Sorts by a column: ascending, at the next call descending, then by point again. */
   #sort(name) {
     const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });
