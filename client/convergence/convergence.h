@@ -149,8 +149,7 @@ struct OutputConvergence {
 struct PointConvergence {
   std::vector<OutputConvergence> outputs;
   std::vector<ContactChange> changes;  ///< differences between neighbouring levels
-  /// Whether the finest three levels have one mode, ripples merged. Otherwise outputs have no
-  /// limit.
+  /// Whether the finest three levels have one mode, ripples merged. Otherwise no limit is visible.
   bool has_one_mode = false;
 };
 

@@ -318,8 +318,7 @@ class Script {
     if (is_text_) {
       label({figure_.title}, x, y, "");
     } else {
-      // Bold letters need gnuplot's enhanced text. A backslash makes its special characters
-      // literal.
+      // Bold letters need gnuplot's enhanced text. A backslash makes characters literal.
       const auto title = gnuplot_text(marked(protocol::visible(figure_.title), "\\_^{}@&~", '\\'));
       add("set label '{{/:Bold*1.25 {}}}' at {} left\n", title.substr(1, title.size() - 2),
           screen(x, y));

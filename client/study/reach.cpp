@@ -58,7 +58,7 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
   }
 }
 
-/// Returns the drop [m] that the tip reaches, at most H. Returns H after kMaxFalls falls.
+/// Returns the drop [m] that the tip reaches, at most H. Assumes H after kMaxFalls solved falls.
 double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m) {
   constexpr int kCoarse = 2;      // elements per link: cheap, and nearly the same fall
   constexpr double kRoom = 0.98;  // safety margin for the drop on the coarse mesh
