@@ -13,9 +13,10 @@ namespace {
 /// The 97.5 % quantile of the standard normal distribution.
 constexpr double kZ = 1.959963984540054;
 
+/// Differences from the mean, exactly 0 for constant values, whose mean may be rounded.
 Eigen::ArrayXd deviations(std::span<const double> values) {
   const Eigen::Map<const Eigen::ArrayXd> x(values.data(), std::ssize(values));
-  return x - x.mean();
+  return x - ((x == x[0]).all() ? x[0] : x.mean());
 }
 
 /// The smallest k with P(B <= k) >= `share`, for B binomial of n draws with probability p.
@@ -37,9 +38,6 @@ std::size_t binomial_quantile(std::size_t n, double p, double share) {
 }  // namespace
 
 Estimate mean_of(std::span<const double> values) {
-  if (values.empty()) {
-    return {};
-  }
   const auto n = static_cast<double>(values.size());
   const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
   const double half = kZ * deviation_of(values) / std::sqrt(n);
