@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 #include <ostream>
 #include <string_view>
 #include <utility>
@@ -22,7 +23,7 @@ namespace oblique::client {
 namespace {
 
 constexpr std::array<std::string_view, 3> kTextFormats{"table", "csv", "json"};
-constexpr std::array kEndings{".svg", ".pdf", ".png", ".gp", ".csv", ".json"};
+constexpr std::array<std::string_view, 6> kEndings{".svg", ".pdf", ".png", ".gp", ".csv", ".json"};
 
 std::string text_in_format(const Answer& answer, Format format) {
   return format == Format::kTable  ? answer.tables
@@ -69,8 +70,9 @@ void add_answer_flags(CLI::App& command, AnswerFlags& flags) {
 
 void check(const AnswerFlags& flags) {
   static_cast<void>(format_named(flags.format, kTextFormats));
-  const auto has_ending = [&](const char* ending) { return flags.file.ends_with(ending); };
-  if (!flags.file.empty() && std::none_of(kEndings.begin(), kEndings.end(), has_ending)) {
+  const auto ending = std::filesystem::path(flags.file).extension().string();
+  if (!flags.file.empty() &&
+      std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end()) {
     throw solver::InputError(
         fmt::format("--out {}: the ending is not a format: it must be one of {}", flags.file,
                     fmt::join(kEndings, ", ")));

@@ -69,10 +69,9 @@ struct SensitivityProblem {
 SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach) {
   check(flags.answer);
   const bool is_sobol = choice_of("--method", flags.method, kMethods) == 0;
+  const std::uint64_t usual_rows = is_sobol ? 512 : 32;
   SensitivityProblem problem{.is_sobol = is_sobol,
-                             .first_rows = std::bit_ceil(flags.rows > 0 ? flags.rows
-                                                         : is_sobol     ? 512
-                                                                        : 32),
+                             .first_rows = std::bit_ceil(flags.rows > 0 ? flags.rows : usual_rows),
                              .outputs = outputs_of_flag(flags.of, false)};
   PointFlags points = flags.points;
   points.sample = fmt::format("random:{}", problem.first_rows);
@@ -216,11 +215,10 @@ Answer sensitivity_answer(const SensitivityProblem& problem, const std::vector<S
       table.rows.push_back(std::move(row));
     }
     for (const Measure& measure : std::span(measures).first(2)) {
-      auto& panel =
-          figure.panels.emplace_back(plot::Panel{.title = problem.outputs[output],
-                                                 .x = {.label = measure.name, .name = measure.name},
-                                                 .y = {.name = "input"},
-                                                 .bars = plot::Bars{.names = problem.inputs}});
+      plot::Panel panel{.title = problem.outputs[output],
+                        .x = {.label = measure.name, .name = measure.name},
+                        .y = {.name = "input"},
+                        .bars = plot::Bars{.names = problem.inputs}};
       plot::Range range{0.0, problem.is_sobol ? 1.0 : 0.0};
       for (const auto& [value, from, to] : measure.of_inputs) {
         panel.bars->heights.push_back(std::isnan(value) ? 0.0 : value);
@@ -228,6 +226,7 @@ Answer sensitivity_answer(const SensitivityProblem& problem, const std::vector<S
         range = {std::fmin(range.from, from), std::fmax(range.to, to)};
       }
       panel.x.span(range, 0.02);
+      figure.panels.push_back(std::move(panel));
     }
   }
   auto answer = answer_of({{"study", study.name()},
