@@ -102,7 +102,7 @@ std::vector<double> morris_outputs(const Function& f, std::size_t inputs, std::u
   return outputs_of(f, morris_trajectory, inputs, seed, trajectories);
 }
 
-bool covers(const Estimate& estimate, double truth) {
+bool contains(const Estimate& estimate, double truth) {
   return estimate.from <= truth && truth <= estimate.to;
 }
 
@@ -114,7 +114,7 @@ void expect_known_indices(const KnownFunction& known, std::uint64_t rows, double
   std::size_t misses = 0;
   const auto expect_index = [&](const Estimate& found, double truth) {
     ++intervals;
-    misses += covers(found, truth) ? 0U : 1U;
+    misses += contains(found, truth) ? 0U : 1U;
     EXPECT_LT(found.half_width(), half_width);
   };
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
@@ -165,8 +165,8 @@ TEST(SobolIndicesTest, IntervalsCoverTheIndicesOfRandomRowsAsOftenAsTheySay) {
     }
     const auto found = sobol_indices(outputs, 3, seed);
     for (std::size_t i = 0; i < 3; ++i) {
-      misses += covers(found.measures[0].of_inputs[i], known.first[i]) ? 0 : 1;
-      misses += covers(found.measures[1].of_inputs[i], known.total[i]) ? 0 : 1;
+      misses += contains(found.measures[0].of_inputs[i], known.first[i]) ? 0 : 1;
+      misses += contains(found.measures[1].of_inputs[i], known.total[i]) ? 0 : 1;
     }
   }
   EXPECT_GT(misses, 50);
