@@ -1,6 +1,5 @@
 #include "worker/conversation.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -41,17 +40,13 @@ const protocol::Results* Outbox::next_to_send() {
 
 template <class Predicate>
 void Outbox::remove(const Predicate& is_unwanted) {
-  std::size_t number = 0;
-  while (number < messages_.size()) {
-    const Message& message = messages_[number];
-    if (!is_unwanted(message.results)) {
-      ++number;
-      continue;
+  for (std::size_t i = messages_.size(); i-- > 0;) {
+    if (const Message& message = messages_[i]; is_unwanted(message.results)) {
+      results_ -= static_cast<std::size_t>(message.results.results_size());
+      bytes_ -= message.bytes;
+      on_their_way_ -= i < on_their_way_ ? 1U : 0U;
+      messages_.erase(messages_.begin() + static_cast<std::ptrdiff_t>(i));
     }
-    results_ -= static_cast<std::size_t>(message.results.results_size());
-    bytes_ -= message.bytes;
-    on_their_way_ -= number < on_their_way_ ? 1U : 0U;
-    messages_.erase(messages_.begin() + static_cast<std::ptrdiff_t>(number));
   }
 }
 
@@ -194,7 +189,8 @@ std::int64_t Conversation::next_deadline_ms() const {
   if (state_ == State::kFinished) {
     return kNever_ms;
   }
-  const std::int64_t stop_ms = stopping_ ? stop_deadline_ms_ : std::min(exit_ms(), idle_exit_ms());
+  const std::int64_t stop_ms =
+      stopping_ ? stop_deadline_ms_ : std::min(settings_.exit.stop_ms, idle_exit_ms());
   const std::int64_t heartbeat_ms = state_ == State::kWelcomed ? heartbeat_due_ms_ : kNever_ms;
   return std::min({deadline_ms_, stop_ms, heartbeat_ms});
 }
@@ -541,23 +537,13 @@ void Conversation::finish(int exit_code, const std::string& reason) {
   effects_.emplace_back(Finish{exit_code, reason + lost});
 }
 
-std::int64_t Conversation::exit_ms() const {
-  const ExitSettings& exit = settings_.exit;
-  return exit.until_ms == kNever_ms ? kNever_ms : exit.until_ms - exit.shutdown_grace_ms;
-}
-
-std::int64_t Conversation::idle_exit_ms() const {
-  const std::int64_t idle_ms = settings_.exit.idle_exit_ms;
-  return idle_ms == kNever_ms ? kNever_ms : last_work_ms_ + idle_ms;
-}
-
 /// Stops the worker at its time or when idle. A worker that was never welcomed exits with 1, so
 /// that whoever started it notices.
 void Conversation::exit_if_due() {
   if (!held_.empty() || !outbox_.is_empty()) {
     last_work_ms_ = now_ms_;
   }
-  const bool is_time = now_ms_ >= exit_ms();
+  const bool is_time = now_ms_ >= settings_.exit.stop_ms;
   if (stopping_ || state_ == State::kFinished || (!is_time && now_ms_ < idle_exit_ms())) {
     return;
   }

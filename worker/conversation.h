@@ -116,14 +116,14 @@ class Outbox {
 
 // ---- The conversation ---------------------------------------------------------------------------
 
-inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max();
+/// Later than any time; a time can be added without overflow.
+inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max() / 2;
 
-/// When a worker ends by itself.
+/// When a worker stops by itself.
 struct ExitSettings {
-  std::int64_t until_ms = kNever_ms;      ///< end of the process, by the clock of `now_ms`
-  std::string until = {};                 ///< the same as the user wrote it
+  std::int64_t stop_ms = kNever_ms;       ///< by the clock of `now_ms`
+  std::string until = {};                 ///< the end of the process as the user wrote it
   std::int64_t idle_exit_ms = kNever_ms;  ///< longest time without work
-  std::int64_t shutdown_grace_ms = 3000;  ///< it stops this long before `until_ms`
 };
 
 /// A time that doubles after each failure, from the first to the second one.
@@ -218,8 +218,7 @@ class Conversation {
   /// Sends waiting results before it requests batches: the server must not lease their points
   /// again.
   void go_on();
-  std::int64_t exit_ms() const;
-  std::int64_t idle_exit_ms() const;
+  std::int64_t idle_exit_ms() const { return last_work_ms_ + settings_.exit.idle_exit_ms; }
   void exit_if_due();
   void begin_stop(const std::string& reason, int exit_code = 0);
   void finish_if_delivered();

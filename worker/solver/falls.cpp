@@ -5,15 +5,12 @@
 #include <exception>
 #include <iterator>
 #include <map>
-#include <new>
 #include <string>
 #include <tuple>
-#include <utility>
 
 #include "worker/solver/fast/kernels.h"
 #include "worker/solver/fast/lane_falls.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
@@ -43,15 +40,15 @@ FallSolution solve_alone(const FallRequest& request) {
     return {solve_stepped_fall(request.motion, request.dt_s, longest_fall_s(*request.chain),
                                request.progress),
             {}};
-  } catch (const std::bad_alloc&) {  // is no property of this fall
-    throw;
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }
 }
 
-std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
-  return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
+/// Memory that a solved fall counts for in the cache.
+std::size_t bytes_of(const FallOutcome& outcome) {
+  constexpr std::size_t kError = std::size_t{1} << 20;
+  return outcome.fallen ? outcome.fallen->fall().bytes() : kError;
 }
 
 /// Why `falling` is outside its domain; else empty. A NaN, which equals nothing, would never be
@@ -122,8 +119,6 @@ std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
     try {
       chains.push_back(std::make_shared<FallenChain>(models[i]));
       places.push_back(i);
-    } catch (const std::bad_alloc&) {
-      throw;
     } catch (const std::exception& error) {
       outcomes[i].error = error.what();
     }
@@ -137,8 +132,8 @@ std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
 
 // ---- FallCache ----------------------------------------------------------------------------------
 
-FallCache::FallCache(const Bounds& bounds, Solve solve)
-    : bounds_(bounds), solve_(std::move(solve)) {
+FallCache::FallCache(std::size_t most_bytes, Solve solve)
+    : most_bytes_(most_bytes), solve_(std::move(solve)) {
   if (!solve_) {
     solve_ = [](std::span<const ModelParameters> models) { return solve_falls(models); };
   }
@@ -167,11 +162,7 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
 std::vector<FallOutcome> FallCache::falls(std::span<const ModelParameters> models) {
   std::vector<FallOutcome> outcomes;
   for (std::size_t i = 0; i < models.size(); ++i) {
-    try {
-      outcomes.push_back(fall(models[i], models.subspan(i + 1)));
-    } catch (const std::exception& error) {
-      outcomes.push_back({nullptr, error.what()});
-    }
+    outcomes.push_back(fall(models[i], models.subspan(i + 1)));
   }
   return outcomes;
 }
@@ -219,46 +210,32 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
 }
 
 void FallCache::solve(const std::vector<Entries::iterator>& claimed,
-                      std::unique_lock<std::mutex>& lock) {
-  std::vector<FallOutcome> outcomes;
-  std::exception_ptr failure;
-  lock.unlock();
-  try {
-    std::vector<ModelParameters> models;
-    for (const auto& entry : claimed) {  // its model never changes
-      models.push_back(entry->model);
-    }
-    outcomes = solve_(models);
-  } catch (...) {
-    failure = std::current_exception();
+                      std::unique_lock<std::mutex>& lock) noexcept {
+  std::vector<ModelParameters> models;
+  for (const auto& entry : claimed) {
+    models.push_back(entry->model);
   }
+  lock.unlock();
+  std::vector<FallOutcome> outcomes = solve_(models);
   lock.lock();
   solved_.notify_all();
-  if (failure) {  // threads that wait for these falls solve them again
-    for (const auto& entry : claimed) {
-      entries_.erase(entry);
-    }
-    std::rethrow_exception(failure);
-  }
   for (std::size_t i = claimed.size(); i-- > 0;) {  // the fall needed first is kept longest
+    usual_bytes_ = std::max(bytes_of(outcomes[i]), usual_bytes_ / 2);
     claimed[i]->outcome = std::move(outcomes[i]);
-    usual_bytes_ = std::max(bytes_of(claimed[i]->outcome), usual_bytes_ / 2);
     entries_.splice(entries_.begin(), entries_, claimed[i]);
   }
   make_room();
 }
 
-/// Whether falls solved ahead, with those being solved, take less than half of the bounds.
+/// Whether falls solved ahead, with those being solved, take less than half of the memory.
 bool FallCache::has_room_ahead() const {
-  std::size_t falls = 0;
   std::size_t bytes = 0;
   for (const Entry& entry : entries_) {
     if (!entry.is_used) {
-      ++falls;
-      bytes += entry.outcome ? bytes_of(entry.outcome) : usual_bytes_;
+      bytes += entry.outcome ? bytes_of(*entry.outcome) : usual_bytes_;
     }
   }
-  return 2 * falls < bounds_.falls && 2 * bytes < bounds_.bytes;
+  return 2 * bytes < most_bytes_;
 }
 
 /// Removes the least recently used falls; those solved ahead only if no others are left.
@@ -267,17 +244,17 @@ void FallCache::make_room() {
   std::size_t bytes = 0;
   for (const Entry& entry : entries_) {
     falls += entry.outcome ? 1U : 0U;
-    bytes += bytes_of(entry.outcome);
+    bytes += entry.outcome ? bytes_of(*entry.outcome) : 0U;
   }
   for (const bool used : {true, false}) {
     for (auto entry = entries_.end(); entry != entries_.begin();) {
       --entry;
-      if (falls <= 1 || (falls <= bounds_.falls && bytes <= bounds_.bytes)) {
+      if (falls <= 1 || bytes <= most_bytes_) {
         return;
       }
       if (entry->outcome && entry->is_used == used) {
         --falls;
-        bytes -= bytes_of(entry->outcome);
+        bytes -= bytes_of(*entry->outcome);
         entry = entries_.erase(entry);
       }
     }

@@ -49,8 +49,7 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b);
 /// the others.
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains);
 
-/// The same for any models. A model outside its domain has an error as its outcome. Throws
-/// std::bad_alloc if memory is short.
+/// The same for any models. A model outside its domain has an error as its outcome.
 std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models);
 
 }  // namespace oblique::solver

@@ -1,20 +1,13 @@
 #include "worker/solver/solve.h"
 
-#include <cstdint>
 #include <exception>
 #include <map>
-#include <memory>
 #include <mutex>
-#include <optional>
-#include <span>
 #include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/lane_contacts.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/step_choice.h"
 

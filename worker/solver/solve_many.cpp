@@ -8,7 +8,6 @@
 #include <exception>
 #include <future>
 #include <iterator>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -18,7 +17,6 @@
 
 #include "worker/solver/estimate.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/parallel_for.h"
 #include "worker/solver/point_runs.h"

@@ -46,14 +46,14 @@ class StepChoice {
   double fall_s() const { return fall_s_; }
   /// Steps in a contact with restitution e_star, times the model's step factor. Throws InputError
   /// when model.dt_s is above its limit, SolveError when e_star is below kSmallestRestitution or
-  /// steps are too short for the contact to end.
+  /// steps are too short: Contact::kMaxSteps of them would pass before the contact can end, or the
+  /// tip, fallen by about the chain's length, moves by less than the rounding of its position.
   ContactSteps contact(double e_star) const;
   /// Longest stable steps of the explicit integrator in such a contact. In restitution the
   /// stiffness at the tip is k/e*^2.
   ContactSteps contact_limits(double e_star) const;
 
  private:
-  void check_can_end(double step_s) const;
   ContactSteps without_step_factor(double e_star) const;
   ContactSteps stable(const ContactSteps& steps, double e_star) const;
 
@@ -62,6 +62,7 @@ class StepChoice {
   double tip_inertia_kg_;
   double compression_limit_s_;  ///< of the explicit integrator
   double chosen_contact_s_;     ///< by the tolerance alone, where restitution is not fast
+  double shortest_s_;           ///< shorter steps in compression are an error
   double fall_s_;
 };
 

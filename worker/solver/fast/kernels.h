@@ -112,7 +112,7 @@ struct LaneKernel {
 /// Kernels that this machine can run, the fastest first; never empty.
 std::span<const LaneKernel> runnable_lane_kernels();
 
-LaneKernel baseline_kernel();  ///< for every machine: SSE2 on x86-64, NEON on arm64
+LaneKernel baseline_kernel();  ///< for every machine: SSE2 on x86-64
 #if defined(__x86_64__)
 LaneKernel avx2_kernel();    ///< AVX2 and FMA
 LaneKernel avx512_kernel();  ///< AVX-512 F and DQ

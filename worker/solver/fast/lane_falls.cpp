@@ -4,13 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
-#include <memory>
-#include <new>
 #include <numeric>
 #include <optional>
-#include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "worker/solver/fast/collocation_lanes.h"
 #include "worker/solver/fast/lane_stepper.h"
@@ -41,8 +37,8 @@ constexpr std::size_t kMaxSteps = 2'000'000;
 constexpr int kMaxHalvings = 30;
 
 /// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is
-/// SteppedLanes or CollocationFalls. What start() and judge() throw becomes the error of that fall,
-/// except for std::bad_alloc.
+/// SteppedLanes or CollocationFalls. An exception of start() or judge() becomes the error of that
+/// fall.
 template <class Lanes>
 std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> requests, Lanes& lanes) {
   std::vector<FallSolution> solutions(requests.size());
@@ -52,8 +48,6 @@ std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> reques
     FallSolution& solution = solutions[*falling[lane]];
     try {
       work(solution);
-    } catch (const std::bad_alloc&) {  // no fault of this fall
-      throw;
     } catch (const std::exception& error) {
       solution.error = error.what();
     }
@@ -473,13 +467,7 @@ std::vector<FallSolution> solve_by_collocation(std::span<const FallRequest> requ
   if (requests.empty()) {
     return {};
   }
-  const Chain& first = *requests.front().chain;
-  for (const FallRequest& request : requests) {
-    if (!have_one_shape(request.chain->tables(), first.tables())) {
-      throw std::invalid_argument("falls side by side are of chains of one shape");
-    }
-  }
-  CollocationFalls lanes(first, kernel);
+  CollocationFalls lanes(*requests.front().chain, kernel);
   return solve_side_by_side(requests, lanes);
 }
 

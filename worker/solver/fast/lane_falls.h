@@ -31,7 +31,7 @@ std::vector<FallSolution> solve_by_steps(
     std::span<const FallRequest> requests,
     const LaneKernel& kernel = runnable_lane_kernels().front());
 
-/// The same by Gauss collocation. Throws std::invalid_argument where shapes differ.
+/// The same by Gauss collocation.
 std::vector<FallSolution> solve_by_collocation(
     std::span<const FallRequest> requests,
     const LaneKernel& kernel = runnable_lane_kernels().front());

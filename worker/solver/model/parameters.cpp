@@ -52,14 +52,10 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
      [](Model& m, double v) {
        m.lengths_m.assign(static_cast<std::size_t>(v), m.lengths_m.front());
      }},
-    {"length",
-     "m",
-     "length of every link",
-     "> 0",
-     positive,
+    {"length", "m", "length of every link", "> 0", positive,
      [](const Model& m) { return m.lengths_m.front(); },
      [](Model& m, double v) { std::fill(m.lengths_m.begin(), m.lengths_m.end(), v); },
-     {1e-3, 100.0}},
+     UsualRange{1e-3, 100.0}},
     key<&Model::E_Pa>("E", "Pa", "Young's modulus", "> 0", positive, {1e8, 1e12}),
     key<&Model::A_m2>("A", "m^2", "cross-section area", "> 0", positive, {1e-8, 1.0}),
     key<&Model::I_m4>("I", "m^4", "second moment of area", "> 0", positive, {1e-17, 0.1}),
@@ -91,15 +87,10 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
 }};
 
 constexpr std::array<ParameterKey, 3> kPointKeys{{
-    {"H",
-     "m",
-     "drop of the tip at touch",
-     "> 0 and at most the largest drop of the tip",
-     positive,
-     nullptr,
-     nullptr,
-     {1e-4, 10.0}},
-    {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr, {0.0, 5.0}},
+    {"H", "m", "drop of the tip at touch", "> 0 and at most the largest drop of the tip", positive,
+     nullptr, nullptr, UsualRange{1e-4, 10.0}},
+    {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr,
+     UsualRange{0.0, 5.0}},
     {"e", "", "Stronge's energetic coefficient of restitution", "in [0.001, 1]",
      [](double v) { return v >= kSmallestRestitution && v <= 1.0; }, nullptr, nullptr},
 }};

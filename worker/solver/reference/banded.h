@@ -29,15 +29,13 @@ class BandedMatrix {
     }
   }
 
-  /// Sum over entries of left_i A_ij right_j for vectors of stride `stride`.
-  double bilinear(const double* left, const double* right, std::size_t stride) const {
+  /// x^T A x for the entries x[0], x[2], x[4], ...
+  double quadratic_form(const double* x) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < rows(); ++i) {
-      sum += bands_[i][0] * left[i * stride] * right[i * stride];
+      sum += bands_[i][0] * x[2 * i] * x[2 * i];
       for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
-        const std::size_t j = i - d;
-        sum += bands_[i][d] *
-               (left[i * stride] * right[j * stride] + left[j * stride] * right[i * stride]);
+        sum += bands_[i][d] * (2.0 * x[2 * i] * x[2 * (i - d)]);
       }
     }
     return sum;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <numeric>
 
 #include "worker/solver/model/errors.h"
@@ -193,8 +192,7 @@ ChainTables<double> Chain::tables() const {
 }
 
 double Chain::kinetic_energy_J(const Coordinates& v) const {
-  return 0.5 *
-         (mass_.bilinear(v.data(), v.data(), 2) + mass_.bilinear(v.data() + 1, v.data() + 1, 2));
+  return 0.5 * (mass_.quadratic_form(v.data()) + mass_.quadratic_form(v.data() + 1));
 }
 
 Eigen::Vector2d Chain::inner_end_force(std::size_t link, const Coordinates& q,
@@ -250,7 +248,7 @@ double Chain::risen_eigenvalue(double tip_stiffness_N_m) const {
     z[tip] = 1.0;
     factor.solve_pairs(z.data());
     const double rise =
-        (tip_stiffness_N_m * z[tip] - 1.0) * z[tip] / mass_.bilinear(z.data(), z.data(), 2);
+        (tip_stiffness_N_m * z[tip] - 1.0) * z[tip] / mass_.quadratic_form(z.data());
     if (!(rise > 0.01 * kEigenvalueAccuracy * lambda)) {
       break;
     }

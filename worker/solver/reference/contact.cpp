@@ -160,10 +160,7 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
 }
 
 void Contact::happen(ContactEvent event) {
-  if (++events_ > kMaxEvents) {
-    throw SolveError("the contact has more than " + std::to_string(kMaxEvents) + " events within " +
-                     readable_number(t_s_) + " s");
-  }
+  ++events_;
   margin_.add_event(law_, event, tip_);
   const double ft = law_.ft_N(tip_);
   const double ft_rate_before = sign_of(ft) * law_.ft_rate_N_s(tip_);

@@ -18,8 +18,6 @@ class Contact {
  public:
   /// Time within which a contact must end [s].
   static constexpr double kLongest_s = 20e-3;
-  /// More events mean that states follow each other without time passing.
-  static constexpr int kMaxEvents = 10'000;
   /// Ten thousand times the steps that a contact takes by default.
   static constexpr std::int64_t kMaxSteps = 5'000'000;
 
@@ -30,8 +28,8 @@ class Contact {
   AffineContactForce<double> force() const { return law_.affine(); }
   const ContactLaw& law() const { return law_; }
 
-  /// True when the step is accepted. Throws SolveError when the tip's state is not finite, the
-  /// contact outlasts kLongest_s, or has more than kMaxEvents events or kMaxSteps steps.
+  /// True when the step is accepted. Throws SolveError when the tip's state is not finite, or the
+  /// contact outlasts kLongest_s or kMaxSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
   /// Whether the last accepted step ended at the first turn. Up to there e* has no effect.

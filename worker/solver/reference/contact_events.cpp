@@ -1,7 +1,6 @@
 #include "worker/solver/reference/contact_events.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace oblique::solver {

@@ -173,10 +173,9 @@ class ReactionPeaks {
   /// other side of an event) is ignored.
   void add(double end_s, double width_s, const double* squared_N2, std::size_t stride = 1) {
     const Span next{end_s - 0.5 * width_s, width_s};
-    if (has_last_ && !(next.middle_s > last_.middle_s)) {
+    if (!(next.middle_s > last_.middle_s)) {
       return;
     }
-    has_last_ = true;
     for (Reaction& reaction : reactions_) {
       const double next_N2 = *squared_N2;
       squared_N2 += stride;
@@ -199,7 +198,7 @@ class ReactionPeaks {
 
  private:
   struct Span {
-    double middle_s = 0.0;
+    double middle_s = -std::numeric_limits<double>::infinity();
     double width_s = 0.0;
   };
   struct Reaction {
@@ -211,7 +210,6 @@ class ReactionPeaks {
   void add_maximum(Reaction& reaction, const Span& next, double next_N2) const;
 
   std::vector<Reaction> reactions_;
-  bool has_last_ = false;
   Span before_;  ///< of the values before_N2
   Span last_;    ///< of the values last_N2
 };

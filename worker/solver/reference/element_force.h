@@ -6,7 +6,7 @@
 namespace oblique::solver {
 
 /// c + a b. Multiply-adds are named, since compilers would fuse different ones in each instance of
-/// a template. Packs have fused ones in lane_pack.h.
+/// a template. Packs have fused ones in fast/kernel_of.h.
 template <class C, class A, class B>
 inline auto plus_product(const C& c, const A& a, const B& b) {
   return c + a * b;

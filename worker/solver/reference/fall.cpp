@@ -1,8 +1,6 @@
 #include "worker/solver/reference/fall.h"
 
 #include <algorithm>
-#include <cmath>
-#include <string>
 #include <utility>
 
 #include "worker/solver/model/errors.h"
