@@ -47,7 +47,7 @@ struct Options {
   SessionSettings session;
   oblique::protocol::LogSettings log;
   std::string keys;
-  std::uint64_t fall_memory_bytes = 0;  ///< 0: a part of the free memory
+  std::uint64_t fall_memory_bytes = 0;  ///< 0: an eighth of the free memory
   double idle_exit_s = 0.0;
   pid_t parent = 0;
 };
@@ -58,7 +58,7 @@ std::string host_name() {
   return host.data();
 }
 
-/// Why `name` cannot be shown on any terminal and sent in any message; else empty.
+/// Returns an error message for a name that terminals or messages cannot contain; else empty.
 std::string check_name(const std::string& name) {
   constexpr std::size_t kLongestName = 200;
   const bool is_plain =
@@ -77,7 +77,7 @@ std::optional<double> seconds_until(const std::string& text) {
     const int day = parts.tm_mday;
     const std::chrono::duration<double> left =
         std::chrono::system_clock::from_time_t(timegm(&parts)) - std::chrono::system_clock::now();
-    // timegm makes a day that the month does not have one of the next month.
+    // timegm turns February 30 into a day of March.
     return parts.tm_mday == day ? std::optional(left.count()) : std::nullopt;
   }
   constexpr std::array kUnits_s{1.0, 60.0, 3600.0};
@@ -147,7 +147,7 @@ int run_worker(Options options) {
     notifier.stopping("stopping", kLongestEnd);
   });
   if (session.is_solving()) {
-    // Points cannot be interrupted and may take long; their results are not needed.
+    // The points under way cannot be interrupted, and their results are not needed.
     spdlog::default_logger()->flush();
     std::_Exit(exit_code);
   }

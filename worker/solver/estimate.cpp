@@ -85,25 +85,19 @@ std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcom
   return points;
 }
 
-/// Sets the companions of points, one for points of a model that follow each other.
+/// Sets the companions of points. Consecutive points of one model share a companion.
 void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
   std::vector<ModelParameters> companions;
-  std::vector<std::size_t> number;  // of each point's companion
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ModelParameters& model = points[i].point.finger.model();
-    if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
-      companions.push_back(companion_model(model));
-    }
-    number.push_back(companions.size() - 1);
+  for (const SolvedPoint& solved : points) {
+    companions.push_back(companion_model(solved.point.finger.model()));
   }
   const std::vector<FallOutcome> fallen = falls.falls(companions);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const ModelParameters& companion = companions[number[i]];
-    if (i > 0 && number[i] == number[i - 1]) {
+    const ModelParameters& model = points[i].point.finger.model();
+    if (i > 0 && points[i - 1].point.finger.model() == model) {
       points[i].companion = points[i - 1].companion;
-    } else if (fallen[number[i]].fallen &&
-               companion.elements_per_link < points[i].point.finger.model().elements_per_link) {
-      points[i].companion.emplace(companion, fallen[number[i]].fallen);
+    } else if (fallen[i].fallen && companions[i].elements_per_link < model.elements_per_link) {
+      points[i].companion.emplace(companions[i], fallen[i].fallen);
     }
   }
 }

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <chrono>
-#include <compare>
 #include <cstdint>
 #include <exception>
 #include <future>
@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -224,15 +225,13 @@ class Work {
   void sort_points() {
     std::vector<std::uint64_t> falls;  // of each model
     std::transform(models_.begin(), models_.end(), std::back_inserter(falls), fall_hash);
-    std::sort(points_.begin(), points_.end(), [&falls](const Entry& a, const Entry& b) {
-      std::strong_ordering order = falls[a.point.model] <=> falls[b.point.model];
-      order = std::is_eq(order) ? a.point.model <=> b.point.model : order;
-      for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e_star}) {
-        if (std::is_eq(order)) {
-          order = std::strong_order(a.point.point.*value, b.point.point.*value);  // NaN too
-        }
-      }
-      return std::is_eq(order) ? a.number < b.number : std::is_lt(order);
+    const auto bits = [](double value) {
+      return std::bit_cast<std::uint64_t>(value);
+    };  // orders NaN
+    std::ranges::sort(points_, {}, [&](const Entry& entry) {
+      const auto& [model, point] = entry.point;
+      return std::tuple(falls[model], model, bits(point.H_m), bits(point.mu), bits(point.e_star),
+                        entry.number);
     });
   }
 

@@ -120,7 +120,7 @@ void CollocationLanes::accept() {
 CollocationLanes::Coordinate CollocationLanes::coordinate(std::size_t lane, std::size_t i) const {
   const std::size_t stride = vector_ * lanes();
   const std::size_t first = i * lanes() + lane;
-  Coordinate coordinate{arrays_.state[first], arrays_.state[first + stride], {}};
+  Coordinate coordinate{arrays_.h_s[lane], arrays_.state[first], arrays_.state[first + stride], {}};
   for (std::size_t stage = 0; stage < coordinate.a.size(); ++stage) {
     coordinate.a[stage] = arrays_.stage_a[first + stage * stride];
   }

@@ -43,9 +43,10 @@ class CollocationLanes {
   /// Accepts the states at the end of the last attempt in the lanes whose step is_accepted.
   void accept();
 
-  /// One coordinate of a lane at the start of the last attempt, and its accelerations at the
-  /// stages.
+  /// One coordinate of a lane: the step length of the last attempt, the values at its start and the
+  /// accelerations at its stages.
   struct Coordinate {
+    double h_s;
     double q;
     double v;
     std::array<double, GaussCollocation::kStages> a;

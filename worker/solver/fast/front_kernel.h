@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <type_traits>
 
 #include "worker/solver/fast/gauss_collocation.h"
 #include "worker/solver/reference/chain_kernel.h"
@@ -41,16 +42,11 @@ inline std::size_t pivots_of(const ChainTables<Constant>& chain, std::size_t ele
   return ends_chain ? 8 : ends_link ? 6 : 4;
 }
 
-template <std::size_t number>
-struct Place {
-  static constexpr std::size_t value = number;
-};
-
-/// operation(Place<first>), ..., operation(Place<last - 1>): a loop that is always unrolled.
+/// Calls `operation` with integral constants from `first` to `last` - 1: an unrolled loop.
 template <std::size_t first, std::size_t last, class Operation>
 inline void for_each_place(const Operation& operation) {
   if constexpr (first < last) {
-    operation(Place<first>{});
+    operation(std::integral_constant<std::size_t, first>{});
     for_each_place<first + 1, last>(operation);
   }
 }

@@ -150,37 +150,32 @@ struct DenseWeights {
   double by_q[kStages];
 };
 
-/// One coordinate over a step: the polynomial through the stages.
-struct CoordinateOverStep {
-  double h_s;
-  CollocationLanes::Coordinate at;
+using Coordinate = CollocationLanes::Coordinate;
 
-  double position(const DenseWeights& weights) const {
-    return at.q + (weights.c * h_s * at.v + h_s * h_s * weighted(weights.by_q));
-  }
-  double rate(const double* by_v) const { return at.v + h_s * weighted(by_v); }
+double position(const Coordinate& at, const DenseWeights& weights) {
+  const double sum = std::inner_product(at.a.begin(), at.a.end(), weights.by_q, 0.0);
+  return at.q + (weights.c * at.h_s * at.v + at.h_s * at.h_s * sum);
+}
 
- private:
-  double weighted(const double* weights) const {
-    return std::inner_product(at.a.begin(), at.a.end(), weights, 0.0);
-  }
-};
+double rate(const Coordinate& at, const double* by_v) {
+  return at.v + at.h_s * std::inner_product(at.a.begin(), at.a.end(), by_v, 0.0);
+}
 
 /// Fraction of the step at which the height y first stops falling; above 1 if it falls during the
 /// whole step. Evaluated at the stages and at the end.
-double turn_of(const CoordinateOverStep& y) {
+double turn_of(const Coordinate& y) {
   const GaussCollocation& rule = gauss_collocation();
   double low = 0.0;
   for (std::size_t place = 0; place <= kStages; ++place) {
     const bool is_stage = place < kStages;
     double high = is_stage ? rule.node[place] : 1.0;
-    if (y.rate(is_stage ? rule.integral[place] : rule.weight) < 0.0) {
+    if (rate(y, is_stage ? rule.integral[place] : rule.weight) < 0.0) {
       low = high;
       continue;
     }
     for (int i = 0; i < 60; ++i) {
       const double middle = 0.5 * (low + high);
-      (y.rate(DenseWeights(middle).by_v) < 0.0 ? low : high) = middle;
+      (rate(y, DenseWeights(middle).by_v) < 0.0 ? low : high) = middle;
     }
     return low;
   }
@@ -197,16 +192,16 @@ class CollocationFall : public Fall {
 
   /// Adds the step that a lane has solved and not accepted yet. True when the tip turns within it:
   /// the fall is then complete.
-  bool append(const CollocationLanes& lanes, std::size_t lane, const CoordinateOverStep& tip_y) {
+  bool append(const CollocationLanes& lanes, std::size_t lane, const Coordinate& tip_y) {
     if (steps_.size() % steps_kept_ == 0) {
       states_.push_back(lanes.state(lane));
       thin_states();
     }
-    steps_.push_back({time_s_, -tip_y.at.q, tip_y.h_s});
+    steps_.push_back({time_s_, -tip_y.q, tip_y.h_s});
     const double turn = turn_of(tip_y);
     if (turn <= 1.0) {
       last_turn_ = turn;
-      largest_drop_m_ = -tip_y.position(DenseWeights(turn));
+      largest_drop_m_ = -position(tip_y, DenseWeights(turn));
       return true;
     }
     time_s_ += tip_y.h_s;
@@ -240,14 +235,14 @@ class CollocationFall : public Fall {
 
   ChainState state_at_drop(double H_m) const override {
     const std::size_t number = step_from(H_m, &Step::drop_m);
-    const std::vector<CoordinateOverStep> step = solve_again(number);
+    const std::vector<Coordinate> step = solve_again(number);
     const double last = number + 1 == steps_.size() ? last_turn_ : 1.0;
-    const CoordinateOverStep& y = step[tip_y()];
+    const Coordinate& y = step[tip_y()];
     double at = 0.0;
     locate_drop(last, 1e-15, [&](double c) {
       at = c;
       const DenseWeights weights(c);
-      return std::pair(H_m + y.position(weights), y.h_s * y.rate(weights.by_v));
+      return std::pair(H_m + position(y, weights), y.h_s * rate(y, weights.by_v));
     });
     return within(number, step, at);
   }
@@ -270,7 +265,7 @@ class CollocationFall : public Fall {
     steps_kept_ *= 2;
   }
 
-  std::vector<CoordinateOverStep> solve_again(std::size_t number) const {
+  std::vector<Coordinate> solve_again(std::size_t number) const {
     CollocationLanes lanes(kernel_, chain_);
     lanes.set_state(0, states_[number / steps_kept_]);
     lanes.step(0).error_m = error_m_;
@@ -282,24 +277,23 @@ class CollocationFall : public Fall {
       }
       lanes.accept();
     }
-    std::vector<CoordinateOverStep> coordinates;
+    std::vector<Coordinate> coordinates;
     for (std::size_t i = 0; i < lanes.coordinates(); ++i) {
-      coordinates.push_back({steps_[number].h_s, lanes.coordinate(0, i)});
+      coordinates.push_back(lanes.coordinate(0, i));
     }
     return coordinates;
   }
 
   /// The state at the fraction c of a step.
-  ChainState within(std::size_t number, const std::vector<CoordinateOverStep>& step,
-                    double c) const {
+  ChainState within(std::size_t number, const std::vector<Coordinate>& step, double c) const {
     const DenseWeights weights(c);
     ChainState state;
     state.t_s = steps_[number].t_s + c * steps_[number].h_s;
     state.q.resize(2, chain_.rows());
     state.v.resize(2, chain_.rows());
     for (std::size_t i = 0; i < step.size(); ++i) {
-      state.q.data()[i] = step[i].position(weights);
-      state.v.data()[i] = step[i].rate(weights.by_v);
+      state.q.data()[i] = position(step[i], weights);
+      state.v.data()[i] = rate(step[i], weights.by_v);
     }
     return state;
   }
@@ -411,8 +405,8 @@ class CollocationFalls {
       }
       return nullptr;
     }
-    const CoordinateOverStep tip_y{step.h_s, lanes_.coordinate(lane, fall->tip_y())};
-    if (!(std::abs(tip_y.at.q) <= 2.0 * length_m)) {
+    const Coordinate tip_y = lanes_.coordinate(lane, fall->tip_y());
+    if (!(std::abs(tip_y.q) <= 2.0 * length_m)) {
       throw SolveError("the fall diverged at t = " + readable_number(fall->time_s()) + " s");
     }
     if (fall->append(lanes_, lane, tip_y)) {
@@ -427,7 +421,7 @@ class CollocationFalls {
                        exact_number(static_cast<double>(kMaxSteps)) + " steps");
     }
     if (progress != nullptr) {
-      progress->store(-tip_y.at.q, std::memory_order_relaxed);
+      progress->store(-tip_y.q, std::memory_order_relaxed);
     }
     return nullptr;
   }

@@ -31,7 +31,7 @@ ElementConstants<double> element_constants(double length_m, double EA_N, double 
 
 /// Eq. 7 as corrected: strain energy U = 1/2 int (EA eps^2 + EI kappa^2) dx of one element [J],
 /// with eps = (r'.r' - 1)/2 and kappa^2 = r''.r'' (eq. 8).
-double strain_energy(const GradientCoefficients& c, const ElementConstants<double>& constants);
+double strain_energy(const ElementCoordinates& q, const ElementConstants<double>& constants);
 
 /// dU/dq (eqs. 9 to 11), by elastic_forces().
 ElementCoordinates elastic_gradient(const ElementCoordinates& q,

@@ -115,9 +115,7 @@ TipState ElementChain::tip(const ChainState& state) const {
 double ElementChain::strain_energy_J(const Coordinates& q) const {
   double energy = 0.0;
   for (const Element& element : elements_) {
-    const auto& constants = constants_of(element);
-    energy += strain_energy(
-        gradient_coefficients(coordinates_of(element, q), constants.inverse_length), constants);
+    energy += strain_energy(coordinates_of(element, q), constants_of(element));
   }
   return energy;
 }

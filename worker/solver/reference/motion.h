@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "worker/solver/reference/chain.h"
+#include "worker/solver/reference/pefrl.h"
 #include "worker/solver/reference/tip.h"
 
 namespace oblique::solver {
@@ -48,7 +49,14 @@ class ExplicitMotion : public Motion {
   TipState tip(const ChainState& state) const override { return chain_.tip(state); }
   Energies energies(const ChainState& state) const override { return chain_.energies(state); }
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
-                                double h_s, ChainState& to) const override;
+                                double h_s, ChainState& to) const override {
+    to.t_s = from.t_s + h_s;
+    to.q.resizeLike(from.q);
+    to.v.resizeLike(from.v);
+    Coordinates scratch(2, chain_.rows());
+    return pefrl_step(chain_.tables(), force, h_s, from.q.data(), from.v.data(), to.q.data(),
+                      to.v.data(), scratch.data());
+  }
   void restart(const AffineContactForce<double>&, ChainState&) const override {}
   Eigen::Vector2d momentum_Ns(const ChainState& state) const override {
     return chain_.momentum_Ns(state.v);
@@ -57,7 +65,17 @@ class ExplicitMotion : public Motion {
     return chain_.node_positions_m(state.q);
   }
   void reactions(const AffineContactForce<double>& force, const ChainState& state,
-                 Eigen::Matrix2Xd& reactions_N) const override;
+                 Eigen::Matrix2Xd& reactions_N) const override {
+    const TipState at = chain_.tip(state);
+    Coordinates acceleration(2, chain_.rows());
+    chain_.accelerations(state.q.data(), force.ft_N(at.x_m, at.y_m), force.fn_N(at.y_m),
+                         acceleration.data());
+    reactions_N.resize(2, static_cast<Eigen::Index>(chain_.links()));
+    for (std::size_t link = 0; link < chain_.links(); ++link) {
+      reactions_N.col(static_cast<Eigen::Index>(link)) =
+          chain_.inner_end_force(link, state.q, acceleration);
+    }
+  }
 
  private:
   const Chain& chain_;

@@ -46,7 +46,7 @@ GradientCoefficients gradient(const Nodes& q) {
 }
 
 double energy(const Nodes& q) {
-  return strain_energy(gradient(q), constants());
+  return strain_energy(q.transpose(), constants());
 }
 
 Nodes energy_gradient(const Nodes& q) {
