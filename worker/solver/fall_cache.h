@@ -15,7 +15,7 @@
 
 namespace oblique::solver {
 
-class FallenChain;  ///< of the implementation: a chain with its fall
+class FallenChain;  ///< implementation: a chain with its fall
 
 /// A fall, or the reason why there is none.
 struct FallOutcome {
@@ -49,7 +49,7 @@ class FallCache {
   struct Entry {
     ModelParameters model;               ///< as returned by fall_model()
     std::optional<FallOutcome> outcome;  ///< empty while it is being solved
-    bool is_used = false;                ///< requested, not only solved ahead
+    bool is_used = false;                ///< false if it was only solved ahead
   };
   using Entries = std::list<Entry>;
 
@@ -67,7 +67,7 @@ class FallCache {
   std::mutex mutex_;
   std::condition_variable solved_;
   Entries entries_;              ///< most recently used first
-  std::size_t usual_bytes_ = 0;  ///< of falls solved lately
+  std::size_t usual_bytes_ = 0;  ///< estimated memory of a fall that is being solved
 };
 
 }  // namespace oblique::solver

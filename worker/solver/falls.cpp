@@ -24,8 +24,7 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// Maximum number of explicit steps in sqrt(2 length / g) for which they are faster than
-/// collocation (fast/README.md).
+/// With fewer explicit steps in sqrt(2 length/g), stepping is faster than collocation.
 constexpr double kFewSteps = 150'000.0;
 
 bool falls_by_collocation(const FallenChain& chain) {
@@ -51,8 +50,8 @@ std::size_t bytes_of(const FallOutcome& outcome) {
   return outcome.fallen ? outcome.fallen->fall().bytes() : kError;
 }
 
-/// Why `falling` is outside its domain; else empty. A NaN, which equals nothing, would never be
-/// found among the entries.
+/// Returns why `falling` is outside its domain; else an empty text. A model with a NaN equals no
+/// entry of the cache and would never be found.
 std::string fault_of(const ModelParameters& falling) {
   try {
     validate(falling);
@@ -152,7 +151,7 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
     }
     const auto claimed = claim(falling, ahead);
     if (claimed.empty()) {
-      solved_.wait(lock);  // then look again: it may have been solved and removed
+      solved_.wait(lock);
     } else {
       solve(claimed, lock);
     }
@@ -185,7 +184,7 @@ FallOutcome FallCache::use(Entries::iterator entry) {
   return *entry->outcome;
 }
 
-/// Makes entries for the falls that this thread will solve; none if other threads solve them all.
+/// Makes entries for the missing falls that this thread will solve.
 std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters& falling,
                                                            std::span<const ModelParameters> ahead) {
   const bool in_lanes = fall_side_by_side(falling, falling);

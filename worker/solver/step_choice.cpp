@@ -42,7 +42,7 @@ double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
     }
     return model.dt_fall_s;
   }
-  // A looser tolerance changes the contact only, so that models that differ in it share a fall.
+  // A tolerance looser than the default changes only the contact, so that falls are shared.
   if (implicit) {
     return StepChoice::kImplicitFallFraction * std::sqrt(model.lengths_m.back() / model.g_m_s2) *
            std::min(1.0, at_tolerance(model, kGeneralizedAlphaOrder));
@@ -87,8 +87,8 @@ ContactSteps StepChoice::contact_limits(double e_star) const {
 
 /// `steps`, at most kLongestFraction of the stability limit.
 ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const {
-  // A spring at the tip adds at most its stiffness over the tip's inertia to the square of the
-  // highest frequency. This bound is cheap, the frequency itself would be searched for each e*.
+  // A spring at the tip adds at most stiffness/tip inertia to the square of the highest frequency.
+  // This bound is cheap; the frequency itself would need a search for each e*.
   const double tangential_ratio = 1.0 / model_.eta2;
   const double added_N_m = model_.k_N_m * (std::max(1.0 / (e_star * e_star), tangential_ratio) -
                                            std::max(1.0, tangential_ratio));

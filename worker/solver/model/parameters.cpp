@@ -95,7 +95,7 @@ constexpr std::array<ParameterKey, 3> kPointKeys{{
      [](double v) { return v >= kSmallestRestitution && v <= 1.0; }, nullptr, nullptr},
 }};
 
-/// The position of `name` in `names`. Throws InputError about `key` when it is not among them.
+/// The index of `name` in `names`. Throws InputError about `key` for an unknown name.
 std::size_t index_of(std::string_view name, std::span<const std::string_view> names,
                      const std::string& key) {
   const auto found = std::ranges::find(names, name);
@@ -114,7 +114,7 @@ bool is_usual(const ParameterKey& key, double value) {
          (value >= key.usual.from && value <= key.usual.to);
 }
 
-/// As people type it: 7e10, 2700.
+/// Formats 7e+10 as 7e10.
 std::string short_number(double value) {
   std::string text = readable_number(value);
   if (auto exponent = text.find('e') + 1; exponent != 0) {  // after the e
@@ -133,8 +133,8 @@ std::string outside_usual(const ParameterKey& key, double value) {
          short_number(key.usual.from) + " to " + with_unit(key, key.usual.to);
 }
 
-/// The value times the power of 1000 that brings it into the range; of several the nearest to its
-/// middle. Nothing for a key without a unit.
+/// The value times a power of 1000 that is in the usual range and nearest to its middle. Nothing
+/// for a key without a unit.
 std::optional<double> in_another_unit(const ParameterKey& key, double value) {
   const auto& [from, to] = key.usual;
   const double middle = std::sqrt(from * to);

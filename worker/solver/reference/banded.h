@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -22,7 +21,7 @@ class BandedMatrix {
   double& at(std::size_t row, std::size_t distance) { return bands_[row][distance]; }
   double at(std::size_t row, std::size_t distance) const { return bands_[row][distance]; }
 
-  /// Adds to the entry (row, column) of the lower part. Needs |row - column| <= kHalfBandwidth.
+  /// Adds to the entry (row, column) of the lower part. |row - column| <= kHalfBandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     if (row >= column) {
       bands_[row][row - column] += value;
@@ -49,7 +48,7 @@ class BandedMatrix {
 class BandedCholesky {
  public:
   BandedCholesky() = default;
-  /// Factors `matrix`, if it is positive_definite().
+  /// Factors `matrix` as far as it is positive definite.
   explicit BandedCholesky(const BandedMatrix& matrix) : rows_(matrix.rows() + kHalfBandwidth) {
     std::vector<double> pivots(rows_.size());
     for (std::size_t i = 0; i < matrix.rows(); ++i) {
@@ -75,7 +74,7 @@ class BandedCholesky {
 
   bool positive_definite() const { return positive_definite_; }
 
-  /// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c]. Needs
+  /// Solves A z = f in place for two interleaved right-hand sides f[2 i + c]. Requires
   /// positive_definite().
   void solve_pairs(double* f) const {
     ForwardSubstitution<double> forward;
@@ -88,7 +87,7 @@ class BandedCholesky {
     });
   }
 
-  /// Its rows, and kHalfBandwidth more of zeros.
+  /// The rows, and kHalfBandwidth more of zeros.
   const FactorRow<double>* data() const { return rows_.data(); }
 
  private:
@@ -96,16 +95,15 @@ class BandedCholesky {
   bool positive_definite_ = true;
 };
 
-/// A square banded matrix with `bandwidth` diagonals on either side, and its LU factors with
-/// partial pivoting inside the band: work and memory are linear in the number of rows, and a zero
-/// on the diagonal (a multiplier's row) is allowed.
+/// A square matrix with `bandwidth` diagonals on either side, and its LU factors with partial
+/// pivoting inside the band. Zeros on the diagonal, as in multipliers' rows, are allowed.
 template <std::size_t bandwidth>
 class BandedLu {
  public:
   /// A matrix of zeros.
   explicit BandedLu(std::size_t rows) : rows_(rows), pivots_(rows) {}
 
-  /// Needs |row - column| <= bandwidth.
+  /// |row - column| <= bandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     rows_[row][column + bandwidth - row] += value;
   }
@@ -152,8 +150,8 @@ class BandedLu {
     return true;
   }
 
-  /// Solves in place. Needs a successful factor().
-  void solve(std::span<double> x) const {
+  /// Solves in place. Requires a successful factor().
+  void solve(double* x) const {
     const std::size_t n = rows_.size();
     for (std::size_t k = 0; k < n; ++k) {
       std::swap(x[k], x[pivots_[k]]);

@@ -9,10 +9,9 @@
 namespace oblique::solver {
 namespace {
 
-/// Most states kept. A state has 32 bytes a row; when there are more, every other one is dropped.
+/// When so many states are kept, every second one is dropped. A state has 32 bytes per row.
 constexpr std::size_t kMaxKept = 4096;
-/// More steps in sqrt(2 length/g) would take hours.
-constexpr double kMaxSteps = 1e9;
+constexpr double kMaxSteps = 1e9;  ///< in sqrt(2 length/g); more would take hours
 
 }  // namespace
 
@@ -41,7 +40,7 @@ SteppedFall::SteppedFall(std::shared_ptr<const Motion> motion, double dt_s, doub
 }
 
 bool SteppedFall::is_over_after_next(const TipState& tip) {
-  // Times are products, since sums would accumulate rounding.
+  // Times are products, because sums would accumulate rounding.
   const double t_s = time_s(++step_);
   if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m_) {
     throw SolveError("the fall diverged at t = " + readable_number(t_s) +

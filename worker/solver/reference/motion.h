@@ -8,9 +8,8 @@
 
 namespace oblique::solver {
 
-/// An integrator with its system of equations. Constant; the state is a ChainState, whose
-/// coordinates belong to the Motion that made it. Const members may be called from several threads
-/// at once.
+/// An integrator with its equations of motion. Immutable; may be used by several threads at once. A
+/// ChainState is valid only for the Motion that made it.
 class Motion {
  public:
   virtual ~Motion() = default;
@@ -19,22 +18,20 @@ class Motion {
   virtual TipState tip(const ChainState& state) const = 0;
   virtual Energies energies(const ChainState& state) const = 0;
 
-  /// Advances `from` by h_s >= 0 seconds under `force` into `to`, and returns the integrals of the
-  /// contact forces over the step.
+  /// Steps from `from` to `to` by h_s >= 0 seconds under `force`. Returns the integrals of `force`.
   virtual ContactIntegrals<double> step(const ChainState& from,
                                         const AffineContactForce<double>& force, double h_s,
                                         ChainState& to) const = 0;
 
-  /// Makes accelerations and multipliers consistent with `force`, after an event changed the law.
+  /// Recomputes accelerations and multipliers for a new `force`.
   virtual void restart(const AffineContactForce<double>& force, ChainState& state) const = 0;
 
   /// Linear momentum of the whole chain [N s].
   virtual Eigen::Vector2d momentum_Ns(const ChainState& state) const = 0;
-  /// Positions of the nodes along the chain, one a column: O first, the tip last.
+  /// Positions of the nodes, one per column, O first and the tip last.
   virtual Coordinates node_positions_m(const ChainState& state) const = 0;
 
-  /// Forces on the outer link at O and at each joint, one a column, from O outwards. Allocates when
-  /// the number of columns differs.
+  /// Forces on the outer link at O and at each joint, one per column, from O outwards.
   virtual void reactions(const AffineContactForce<double>& force, const ChainState& state,
                          Eigen::Matrix2Xd& reactions_N) const = 0;
 };

@@ -107,7 +107,7 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesEvenWithZerosOnTheDiagonal) {
     }
     const Eigen::VectorXd right = Eigen::Map<Eigen::VectorXd>(x.data(), n);
     ASSERT_TRUE(banded.factor());
-    banded.solve(x);
+    banded.solve(x.data());
     const Eigen::VectorXd solution = Eigen::Map<Eigen::VectorXd>(x.data(), n);
     EXPECT_LT((dense * solution - right).norm(), 1e-12 * (dense.norm() * solution.norm()));
     const Eigen::VectorXd expected = dense.partialPivLu().solve(right);
@@ -131,8 +131,8 @@ TEST(BandedLu, AddingABlockEqualsAddingItsEntries) {
   ASSERT_TRUE(by_entries.factor());
   std::vector<double> x{1.0, 2.0, 3.0};
   std::vector<double> y = x;
-  by_block.solve(x);
-  by_entries.solve(y);
+  by_block.solve(x.data());
+  by_entries.solve(y.data());
   EXPECT_EQ(x, y);
 }
 

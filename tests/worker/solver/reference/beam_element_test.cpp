@@ -41,10 +41,6 @@ Nodes straight_nodes(double angle_rad, double x_m, double y_m) {
   return q;
 }
 
-GradientCoefficients gradient(const Nodes& q) {
-  return gradient_coefficients(q.transpose(), 1.0 / kLength_m);
-}
-
 double energy(const Nodes& q) {
   return strain_energy(q.transpose(), constants());
 }
