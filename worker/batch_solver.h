@@ -48,7 +48,7 @@ class BatchSolver {
 
   bool is_solving() const;
 
-  /// Results since the last call, by batch. A result is at most 20 ms old when it appears here.
+  /// Results since the last call, by batch. Threads hold results back for about 20 ms at most.
   std::vector<Progress> collect();
 
  private:
@@ -58,7 +58,7 @@ class BatchSolver {
     const Batch batch;
     std::uint64_t given = 0;            ///< number of positions that threads have taken
     std::size_t solvers = 0;            ///< number of threads that work on the batch
-    std::atomic<bool> dropped = false;  ///< set under the lock, read before each point without it
+    std::atomic<bool> dropped = false;  ///< written under the lock, read without it
     bool unwanted = false;              ///< results are dropped too
   };
   using OpenBatches = std::list<OpenBatch>;

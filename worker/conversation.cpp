@@ -384,7 +384,7 @@ void Conversation::report(Progress& progress) {
                                  : progress.busy_s / static_cast<double>(progress.results.size());
   protocol::Results results = new_message();
   results.set_busy_s(progress.results.empty() ? progress.busy_s : 0.0);
-  // The server accepts ranges of filtered points only with a lease; otherwise it leases them again.
+  // Without a lease the server ignores ranges of filtered points and leases these points again.
   for (std::size_t i = 0; has_lease && i < progress.left_out.size(); ++i) {
     if (results.left_out_size() >= 2 * protocol::kMaxLeftOutRanges) {
       add_results(std::exchange(results, new_message()));

@@ -29,7 +29,7 @@ class TraceRows {
 
  private:
   struct Row {
-    std::uint64_t instant;  ///< number in the contact
+    std::uint64_t instant;  ///< its number in the contact
     bool is_always_kept;
     char state;
     std::vector<double> numbers;

@@ -19,11 +19,11 @@ constexpr int kSmoothOrder = 2;  ///< largest normal force, duration, slide, imp
 constexpr int kRoughOrder = 1;   ///< outputs that depend on fast vibrations or single events
 constexpr int kRefinement = 2;
 
-/// (2 l/L)^4, with l the longest element and L the length of a bending wave as fast as the contact:
-/// the part of the mesh's error for which no order holds yet. The end of a beam struck on a spring
-/// k answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at the tip
-/// the contact is not faster than that mass on the spring. A wave of angular frequency w has the
-/// wavenumber (rho A w^2/(E I))^(1/4).
+/// (2 l/L)^4 with the longest element l and the length L of a bending wave as fast as the contact:
+/// the part of the mesh's error that does not follow the assumed order. The end of a beam struck on
+/// a spring k answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at
+/// the tip the contact is not faster than that mass on the spring. A wave of angular frequency w
+/// has the wavenumber (rho A w^2/(E I))^(1/4).
 double unresolved_waves(const ModelParameters& model) {
   const double mass_per_length_kg_m = model.rho_kg_m3 * model.A_m2;
   const double bending_N_m2 = model.E_Pa * model.I_m4;

@@ -17,7 +17,7 @@ namespace oblique::solver {
 
 class FallenChain;  ///< implementation: a chain with its fall
 
-/// A fall, or the reason why there is none.
+/// A fall, or its error.
 struct FallOutcome {
   std::shared_ptr<const FallenChain> fallen;
   std::string error;

@@ -237,7 +237,7 @@ bool FallCache::has_room_ahead() const {
   return 2 * bytes < most_bytes_;
 }
 
-/// Removes the least recently used falls; those solved ahead only if no others are left.
+/// Removes the least recently used falls. Falls solved ahead and not used yet go last.
 void FallCache::make_room() {
   std::size_t falls = 0;
   std::size_t bytes = 0;

@@ -20,7 +20,7 @@ class FallenChain {
   /// Throws InputError when `model` is outside its domain or its dt_fall is above the limit.
   explicit FallenChain(const ModelParameters& model);
 
-  /// As returned by fall_model().
+  /// The fall_model() of its models.
   const ModelParameters& model() const { return model_; }
   const Chain& chain() const { return chain_; }
   const std::shared_ptr<const Motion>& motion() const { return motion_; }

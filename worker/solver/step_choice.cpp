@@ -24,7 +24,7 @@ void check_asked(const char* key, double asked_s, double limit_s) {
   }
 }
 
-/// Ratio of steps at the model's tolerance to those at the default one, for a method of `order`.
+/// Step at the model's tolerance relative to the step at the default one, for a method of `order`.
 double at_tolerance(const ModelParameters& model, double order) {
   return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
 }
@@ -85,7 +85,7 @@ ContactSteps StepChoice::contact_limits(double e_star) const {
   return {compression_limit_s_, limit_s(chain_, stiffest_N_m)};
 }
 
-/// `steps`, at most kLongestFraction of the stability limit.
+/// Limits `steps` to kLongestFraction of the stability limit.
 ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const {
   // A spring at the tip adds at most stiffness/tip inertia to the square of the highest frequency.
   // This bound is cheap; the frequency itself would need a search for each e*.

@@ -104,7 +104,7 @@ struct CaseResult {
   double vt_out_m_s;
   double vn_out_m_s;
   std::string mode;        ///< order of states, as "SC SR sR sC sR"
-  std::string major_mode;  ///< the same with ripples merged
+  std::string major_mode;  ///< mode with ripples merged
   /// Distance from another order of events, dimensionless, >= 0; near 0 the mode is unreliable. The
   /// next member is the event that nearly changed the order.
   std::optional<double> margin;

@@ -14,7 +14,7 @@ namespace oblique::solver {
 class InputError : public std::runtime_error {
  public:
   struct Fields {
-    std::string text;                         ///< names key, value and what is allowed
+    std::string text;                         ///< names the key, the value and the allowed range
     std::string key = {};                     ///< of the model, or "where" or "sample"
     std::string expression = {};              ///< the wrong expression
     std::optional<std::size_t> block = {};    ///< number from 0, in a study of several

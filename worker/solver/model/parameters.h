@@ -19,7 +19,7 @@ enum class Integrator {
 
 /// All parameters except H, mu and e*. Defaults are the preset `standard`.
 struct ModelParameters {
-  std::vector<double> lengths_m{0.4, 0.4, 0.4};  ///< one a link, from the pin O outwards
+  std::vector<double> lengths_m{0.4, 0.4, 0.4};  ///< of the links, from the pin O outwards
   double E_Pa = 70e9;                            ///< Young's modulus
   double A_m2 = 5.309e-4;                        ///< cross-section area
   double I_m4 = 2.243e-8;                        ///< second moment of area
@@ -107,7 +107,7 @@ struct MeshAccuracy {
   double duration_off;
   double same_mode;  ///< points with the same major mode
 };
-/// From coarse to fine.
+/// In the order from coarse to fine meshes.
 std::span<const MeshAccuracy> mesh_accuracies();
 
 /// `model` with the default of every parameter that does not affect its fall: k, eta2, dt, a

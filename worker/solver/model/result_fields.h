@@ -39,7 +39,7 @@ struct ResultList {
 struct ListPart {
   const ResultList* list;
   std::string_view member = {};  ///< empty: whole elements
-  std::string_view where = {};   ///< only elements with this member true; empty: all
+  std::string_view where = {};   ///< selects elements whose member of this name is true
 };
 
 /// The origin of a value in the database.
@@ -53,7 +53,7 @@ enum class SentWith {
 /// One output of a solved point.
 struct ResultField {
   std::string_view name;           ///< in `solve --json`, inside `group`
-  std::string_view group = {};     ///< the object of `solve --json` that holds it; empty: none
+  std::string_view group = {};     ///< object of `solve --json` that contains it; or empty
   std::string_view column = name;  ///< of the view `runs` and of queries
   std::string_view unit = {};      ///< SI; empty for pure numbers and texts
   std::string_view meaning = {};   ///< one line, the sign included

@@ -66,8 +66,8 @@ inline EventFunction event_function(const ContactLaw& law, ContactEvent event, c
   return {-1.0, 0.0};
 }
 
-/// The displacement of a step in place of the velocity. phi of it is the integral of phi over the
-/// step if phi is a velocity, because such phi are linear.
+/// A TipState with the displacement of a step in place of the velocity. If phi is a velocity, phi
+/// of this state is the integral of phi over the step, because phi is linear.
 inline TipState displacement(const TipState& start, const TipState& end) {
   return {start.x_m, start.y_m, end.x_m - start.x_m, end.y_m - start.y_m};
 }

@@ -126,7 +126,7 @@ ChainState SteppedFall::state_at_time(double t_s) const {
   }
   state.t_s = time_s(last_step);
   const double h_s = t_s - state.t_s;
-  // With shorter implicit steps, dividing by their square would amplify rounding.
+  // Shorter implicit steps would amplify rounding, because they divide by h^2.
   if (h_s > 1e-3 * dt_s_) {
     std::swap(before, state);
     motion_->step(before, kNoContact, h_s, state);

@@ -44,7 +44,7 @@ void balance(const Energies& in, const Energies& out, const ContactRecord& recor
   }
 }
 
-/// A row with the values of the chain; those of the contact are zero.
+/// A row with the values of the chain. Values of the contact are zero.
 TraceRow chain_row(const Motion& motion, const AffineContactForce<double>& force,
                    const ChainState& state, bool with_shape) {
   const auto in_turn = [](const Eigen::Matrix2Xd& columns) {
