@@ -124,7 +124,7 @@ double ClampedBeam::newton_step(const TipLoad& load) {
   if (!matrix.factor()) {
     throw std::runtime_error("the tangent of the clamped beam is singular");
   }
-  matrix.solve(residual);
+  matrix.solve(residual.data());
   double largest = 0.0;
   for (std::size_t i = 0; i < residual.size(); ++i) {
     q_[i + kClamped] -= residual[i];

@@ -10,8 +10,7 @@
 namespace oblique::solver {
 namespace {
 
-/// "H_m" for &CaseResult::H_m, from the compiler's text of this function: outputs are named like
-/// the members that hold them.
+/// Returns the name of a member, such as "H_m" for &CaseResult::H_m. Outputs have these names.
 template <auto member>
 constexpr std::string_view name_of() {
   constexpr std::string_view text = __PRETTY_FUNCTION__;
@@ -41,7 +40,7 @@ T& created(std::optional<T>& member) {
   return member ? *member : member.emplace();
 }
 
-/// The member that these steps reach from a CaseResult.
+/// The member of a CaseResult, or of a member of it, at the end of this path.
 template <auto... steps>
 constexpr auto at = [] {
   using Kept = std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>;
@@ -51,7 +50,7 @@ constexpr auto at = [] {
                        !std::is_same_v<Kept, Value>};
 }();
 
-/// That member of the n-th peak, from 1, of those that are left when ripples are merged.
+/// A member of the n-th major peak, counted from 1; nullptr if there are fewer.
 template <int n, double Peak::*member>
 const double* major_peak(const CaseResult& result) {
   int number = 0;
@@ -63,17 +62,15 @@ const double* major_peak(const CaseResult& result) {
   return nullptr;
 }
 
-Cell cell(double number) {
-  return number;
-}
-Cell cell(bool flag) {
-  return flag;
+template <class Value>
+Cell cell(Value value) {
+  return value;
 }
 Cell cell(PhaseKind kind) {
   return phase_kind_name(kind);
 }
 
-/// Gives `take` these members of each element of a list.
+/// Passes these members of each element of a list to `take`.
 template <auto list, auto... members>
 void each_of(const CaseResult& result, const TakeElement& take) {
   for (const auto& element : result.*list) {
@@ -86,7 +83,7 @@ using Result = CaseResult;
 using Energy = ContactEnergy;
 using Errors = ErrorEstimate;
 
-/// A list whose column and elements are named like its members.
+/// A list whose column and values have the names of the members.
 template <auto list, auto... members>
 constexpr ResultList list_of(std::string_view unit, std::string_view meaning,
                              bool has_names = true) {
@@ -115,7 +112,7 @@ constexpr ResultList kReactionPeaks =
 
 constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
 
-/// A unit, and the one in which tables for people show it.
+/// An SI unit and the unit shown in tables for people.
 struct Unit {
   constexpr Unit(const char* name) : si(name), shown(name) {}
   constexpr Unit(const char* name, const char* shown_name, double shown_per_si)
@@ -145,7 +142,7 @@ constexpr ResultField output(Unit unit, std::string_view meaning) {
   return output(name_of<member>(), unit, meaning, at<member>);
 }
 
-/// Output of an object inside the result.
+/// Output in an object of the result, such as the energy.
 template <auto object, auto member>
 constexpr ResultField output_of(std::string_view group, Unit unit, std::string_view meaning,
                                 std::string_view column = name_of<member>(),
