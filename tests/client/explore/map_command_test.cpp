@@ -143,6 +143,8 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
       {{"--of", "major_modes=3"}, "unknown output `major_modes`"},
       {{"--of", "fn_peak_N"}, "COLUMN=LEVEL"},
       {{"--over", "mode"}, "--over: the values of mode are texts"},
+      {{"--over", "fn_peak_N,ft_peak_N"}, "a picture shows one output"},
+      {{"--elements-per-link", "200"}, "--elements-per-link 200 is too many"},
       {{"--out", "map.doc"}, "map.doc"},
       {{"--mu", "0.4"}, "mu is an axis of the map"},
       {{"--k", "1e7,2e7"}, "--k has several values"}};
@@ -155,7 +157,11 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
            {"mu", "is required as KEY=FROM:TO"},
            {"mu=2:1", "mu"},
            {"wind=0:1", "wind"},
-           {"mu=0:1:5", "is required as KEY=FROM:TO"}}) {
+           {"mu=0:1:5", "is required as KEY=FROM:TO"},
+           {"mu=0.5:0.5", "the ends must differ by more"},
+           {"mu=1:1.0000000001", "the ends must differ by more"},
+           {"links=1:3", "links must be a whole number"},
+           {"H=0.3:1", "--x and --y are both H"}}) {
     const auto ran = test::run_oblique(folder, {"map", "--x", x, "--y", "H=0.3:1", "--e", "1"});
     EXPECT_EQ(ran.exit_code, 2) << ran.out;
     EXPECT_THAT(ran.err, HasSubstr(message));
