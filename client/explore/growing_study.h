@@ -19,13 +19,12 @@
 
 namespace oblique::client {
 
-/// Where the points of an exploration are solved and stored. The server that --server or
-/// OBLIQUE_SERVER names solves them, unless --db is given. Otherwise a server and workers that the
-/// command starts do.
+/// Flags that choose who solves and stores the points of an exploration: the server that --server
+/// or OBLIQUE_SERVER names, unless --db is given; otherwise a server and workers on this machine.
 struct ExploreFlags {
   SourceFlags source;  ///< --db, --server, --keys, --timeout
   RunSettings run;     ///< --workers, --fall-memory, --no-reuse
-  std::string name;    ///< of the study; empty: made by `explored_name`
+  std::string name;    ///< name of the study; empty: made by `explored_name`
 };
 
 /// Adds --name, --db, --server, --keys, --timeout, --workers, --fall-memory and --no-reuse. `flags`
@@ -79,7 +78,7 @@ class GrowingStudy {
   std::unique_ptr<Connection> connection_;
   protocol::Recipe recipe_;    ///< the rounds so far
   protocol::Recipe stored_;    ///< the study that the server had at the start
-  bool is_submitted_ = false;  ///< once by this object, which resumes a paused or cancelled study
+  bool is_submitted_ = false;  ///< set by the first submission, which resumes a paused study
   std::uint64_t points_ = 0;
 };
 

@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-/// How often a cell is halved that a border enters, and that more than two borders enter.
+/// Maximum halvings of a cell whose rim has two crossings, and of a cell with more.
 constexpr std::uint32_t kHalvings = 2;
 constexpr std::uint32_t kMaxHalvings = 4;
 
@@ -25,12 +25,12 @@ LatticePoint middle_of(const LatticePoint& a, const LatticePoint& b) {
   return {(a.x + b.x) / 2, (a.y + b.y) / 2};
 }
 
-/// Sorts points by y, then by x.
+/// Returns a number that sorts points by y, then by x.
 std::uint64_t key_of(const LatticePoint& point) {
   return std::uint64_t{point.y} << 32U | point.x;
 }
 
-/// A square cell that is not halved (yet).
+/// A square cell. Halving replaces it by four.
 struct Cell {
   LatticePoint low;
   std::uint32_t size;
@@ -63,14 +63,14 @@ struct Crossing {
 struct Chord {
   Crossing a;
   Crossing b;
-  int region;  ///< to the right, except for what earlier chords cut off
+  int region;  ///< to the right of the chord, in the part that earlier chords leave
   bool meets_others = false;
 };
 
 /// The borders inside a cell.
 struct Inside {
   std::vector<Chord> chords = {};
-  int rest = 0;  ///< region of what no chord cuts off
+  int rest = 0;  ///< region of the part that no chord cuts off
 
   int region_at(const Position& at) const {
     for (const Chord& chord : chords) {
@@ -207,7 +207,7 @@ Inside BorderSearch::inside_of(const Cell& cell) const {
   Inside inside{.rest = open.empty() ? regions_.at(key_of(cell.low)) : open.back().after};
   while (!open.empty()) {
     const std::size_t n = open.size();
-    std::vector<std::pair<bool, double>> parts;  // from crossing i to the next: stays open, length
+    std::vector<std::pair<bool, double>> parts;  // behind crossing i: has different sides, length
     for (std::size_t i = 0; i < n; ++i) {
       const Crossing& end = open[(i + 1) % n];
       const double way = end.way - open[i].way;
@@ -311,7 +311,7 @@ struct Sample {
   std::size_t curve;
   std::vector<std::uint32_t> places = {};  ///< along the axis of the bracket, to be solved
   std::uint32_t low = 0;
-  std::uint32_t high = 0;  ///< the border is between; both 0: not found
+  std::uint32_t high = 0;  ///< the border is between low and high; both 0: not found
 
   LatticePoint point_at(std::uint32_t place) const {
     return vertex.is_along_x ? LatticePoint{place, vertex.low.y}

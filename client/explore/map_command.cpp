@@ -96,7 +96,7 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
   if (!(*to - *from > grid.last() * std::ldexp(std::max(std::abs(*from), std::abs(*to)), -50))) {
     throw InputError(fmt::format("{} {}: the ends must differ by more", flag, text));
   }
-  solver::check_value(key, axis.value(1));  // whole numbers only have no bracket
+  solver::check_value(key, axis.value(1));  // refuses keys of whole numbers
   return axis;
 }
 
@@ -144,7 +144,7 @@ struct MapPlane {
   MapGrid grid;
   std::array<MapAxis, 2> axes;  ///< x and y
   solver::ModelParameters model = {};
-  std::vector<protocol::Axis> constants = {};  ///< of one value each, or expressions
+  std::vector<protocol::Axis> constants = {};  ///< axes of one value each, or expressions
   std::string columns = {};                    ///< SQL for the region and the number of --over
 
   /// The settings that decide which points are solved.
@@ -253,7 +253,7 @@ MapPlane plane_of(Console& console, const MapFlags& flags) {
 
 struct MapRegion {
   std::string name;
-  int first_number;    ///< in the order in which the regions were found
+  int first_number;    ///< by the order in which the regions were found
   double cells = 0.0;  ///< area in cells of the coarse grid, measured on the raster
 };
 
@@ -358,8 +358,8 @@ std::string islands_sentence(const FoundMap& map) {
       size(map.plane.axes[0]), size(map.plane.axes[1]));
 }
 
-/// The number of regions that tables and the picture show, with the letters A, B, ... All others
-/// are one.
+/// The number of regions that tables and the picture show, with the letters A, B, ... The others
+/// are shown together.
 std::size_t shown_regions(const FoundMap& map) {
   constexpr std::size_t kMaxShown = 16;
   const double least = std::pow(map.plane.grid.cells, 2) / 400.0;
@@ -568,7 +568,7 @@ plot::Figure figure_of(const FoundMap& map) {
 // ---- The command ----
 
 void check_map_flags(const MapFlags& flags) {
-  constexpr std::uint32_t kMaxCells = 512;  // whose points fit into the definition of a study
+  constexpr std::uint32_t kMaxCells = 512;  // more points do not fit into the definition of a study
   constexpr double kLeastBracket = 1e-8;
   if (flags.cells < 2 || flags.cells > kMaxCells) {
     throw InputError(

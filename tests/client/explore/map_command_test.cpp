@@ -71,6 +71,8 @@ TEST(MapCommand, JsonAndCsvHaveTheSameVerticesAndAPictureIsBesideTheTable) {
   }
   EXPECT_THAT(ran.out, HasSubstr("smaller than a cell, 0.244 in mu by 0.0938 in H, may be missed"));
   const auto map = nlohmann::json::parse(file_text(folder.file("map.json")));
+  // The table lists the six regions with at least 0.25 %.
+  EXPECT_THAT(ran.out, HasSubstr(std::to_string(map["regions"].size() - 6) + " other regions"));
   const auto csv = file_text(folder.file("map.csv"));
   EXPECT_TRUE(csv.starts_with("x,y,from,to,width,along\n")) << csv.substr(0, 100);
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
