@@ -328,7 +328,9 @@ class IntervalEnd {
     const double b = g.dot(r);
     const double c = r.squaredNorm() - minimum_ - limit_;
     const double outwards = (std::sqrt(std::max(b * b - a * c, 0.0)) - side_ * b) / a;
-    const double d = side_ * std::min(outwards, farthest);
+    // Differences across a jump make the end seem near.
+    const double least = rise_of(inside_) < 1.0 - kJump ? 2.0 * shortest_ : 0.0;
+    const double d = side_ * std::min(std::max(outwards, least), farthest);
     step += d * per_d;
     step *= part * std::min(1.0, kLongest / step.norm());
     trial_ = base.angles + step;
@@ -342,7 +344,7 @@ class IntervalEnd {
   FitStep inside_;
   VectorXd trial_;
   double part_ = 1.0;  ///< of the step that the linearised model gives
-  double shortest_;
+  double shortest_ = 0.0;
   bool is_correction_ = false;  ///< the trial starts from a step outside
   bool is_open_ = !is_at_bound();
 };
