@@ -1,8 +1,10 @@
 #include "client/explore/answer.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <ostream>
 #include <string_view>
@@ -15,6 +17,7 @@
 #include "client/io/row_output.h"
 #include "client/plot/picture_file.h"
 #include "proto/program/usage.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -79,9 +82,10 @@ void check(const AnswerFlags& flags) {
   if (!flags.file.empty() && !numbers_format(flags.file) &&
       std::find(pictures.begin(), pictures.end(), ending.substr(ending.empty() ? 0 : 1)) ==
           pictures.end()) {
-    throw solver::InputError(fmt::format(
-        "--out {}: the ending is not a format: it must be one of .svg, .pdf, .png, .gp, .csv, .json",
-        flags.file));
+    throw solver::InputError(
+        fmt::format("--out {}: the ending is not a format: it must be one of .svg, .pdf, .png, "
+                    ".gp, .csv, .json",
+                    flags.file));
   }
 }
 
