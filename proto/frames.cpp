@@ -27,7 +27,7 @@ std::string encode_around(const google::protobuf::MessageLite& rest, int number,
   std::string bytes = encode(rest);
   bytes.reserve(bytes.size() + encoded.size() + 16);
   {
-    google::protobuf::io::StringOutputStream stream(&bytes);  // appends
+    google::protobuf::io::StringOutputStream stream(&bytes);  // this stream appends to `bytes`
     google::protobuf::io::CodedOutputStream out(&stream);
     out.WriteTag(WireFormatLite::MakeTag(number, WireFormatLite::WIRETYPE_LENGTH_DELIMITED));
     out.WriteVarint32(static_cast<std::uint32_t>(encoded.size()));

@@ -24,7 +24,7 @@ using solver::ResultField;
 using Numbers = google::protobuf::RepeatedField<double>;
 constexpr std::size_t kLongestText = 65536;
 
-/// Scalars are sent by type. A missing scalar has a value that no result can have.
+/// Returns the value that stands for a missing scalar of type T. No result can have it.
 template <class T>
 T absent() {
   if constexpr (std::is_same_v<T, double>) {
@@ -38,7 +38,8 @@ T absent() {
 
 template <class T>
 bool is_absent(const Member<T>& member, const T& value) {
-  return member.may_be_absent && (value == absent<T>() || value != value);  // NaN differs from NaN
+  // a NaN differs from itself
+  return member.may_be_absent && (value == absent<T>() || value != value);
 }
 
 template <class T, class Values>
@@ -49,7 +50,7 @@ void add_scalars(const CaseResult& result, Values& values) {
   });
 }
 
-/// Reads the scalars of type T; `values` may be shorter than the list.
+/// Reads the scalars of type T. There may be fewer `values` than scalars.
 template <class T, class Values>
 void read_scalars(const Values& values, CaseResult& result) {
   int i = 0;
@@ -61,7 +62,8 @@ void read_scalars(const Values& values, CaseResult& result) {
   });
 }
 
-/// How one of solver::result_lists() is sent: some members of each element, one after another.
+/// How a list of solver::result_lists() is sent: members of each element, one element after
+/// another.
 struct SentList {
   const Numbers& (PointResult::*numbers)() const;
   Numbers* (PointResult::*mutable_numbers)();
@@ -79,14 +81,14 @@ void read_peak(CaseResult& result, const double* x) {
   result.peaks.push_back({x[0], x[1], x[2], false});
 }
 
-/// A phase begins where the previous one ends.
+/// Appends a phase, which begins where the previous phase ends.
 void read_phase(CaseResult& result, const double* end_s) {
   auto& phases = result.phases;
   const auto kind = phases.size() % 2 == 0 ? PhaseKind::kCompression : PhaseKind::kRestitution;
   phases.push_back({kind, phases.empty() ? 0.0 : phases.back().t1_s, *end_s});
 }
 
-/// In the order of solver::result_lists().
+/// The order is that of solver::result_lists().
 constexpr std::array<SentList, 5> kLists{{
     {&PointResult::peaks, &PointResult::mutable_peaks, 0, 3, read_peak},
     {&PointResult::ft_peaks, &PointResult::mutable_ft_peaks, 0, 2,
@@ -253,7 +255,7 @@ std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, 
                    [](double value) { return std::isfinite(value); })) {
     return "it has a value that is not finite";
   }
-  // With `every` above 1 the trace is too long and has no rows.
+  // If `every` is above 1, the trace is too long for a message and has no rows.
   if (states.empty() && trace.result().error().empty() && trace.every() <= 1) {
     return "it has no rows";
   }

@@ -11,57 +11,56 @@
 
 namespace oblique::protocol {
 
-/// Largest magnitude of a number in a result, in SI units. No finger reaches it, and it stays
+/// Maximum absolute value of a number in a result, in SI units. No finger reaches it, and it is
 /// finite in every unit in which it is shown.
 inline constexpr double kLargestOutput = 1e100;
-/// Maximum number of elements of a list in a result, such as peaks. Real results have dozens.
+/// Maximum number of elements of a list in a result, such as peaks. Real results have some dozens.
 inline constexpr int kMaxListElements = 4096;
 /// Maximum number of ranges of left-out points in one message.
 inline constexpr int kMaxLeftOutRanges = 10'000;
 /// Maximum size of a result [bytes].
 inline constexpr std::size_t kMaxResultBytes = std::size_t{1} << 20U;
 
-// Results as messages. Their scalars are those of solver::result_fields(), in its order and without
-// names; the worker sends the names once, in WorkerHello.
+// Results as messages. Their scalars are those of solver::result_fields(), in the same order and
+// without names. The worker sends the names once, in WorkerHello.
 
-/// The message for a result, without the inputs of the point.
+/// Returns the message for a result, without the inputs of the point.
 PointResult to_message(std::uint64_t point, const solver::CaseResult& result);
 
-/// The result in a message; members that the message lacks are 0 or empty.
+/// Returns the result in a message. Members that the message lacks are 0 or empty.
 solver::CaseResult from_message(const PointResult& message);
 
-/// A failed point. An empty reason becomes "unknown".
+/// Returns the message for a failed point. An empty reason becomes "unknown".
 PointResult failed_point(std::uint64_t point, const std::string& reason);
 
-/// Why a received result is invalid, or an empty text. It is invalid if it has another number of
-/// scalars than results have, lacks a required one, has a number that is not finite or exceeds
-/// kLargestOutput, has lists of impossible length, or is too large.
+/// Returns why a received result is invalid, or an empty text. A result is invalid if it has
+/// another number of scalars than it should, lacks a required scalar, has a number that is not
+/// finite or exceeds kLargestOutput, has lists of impossible length, or is too large.
 std::string fault_of(const PointResult& message);
 
-/// Maximum size of the rows of a trace [bytes]: with its result and the model it fits into one
-/// frame.
+/// Maximum size of the rows of a trace [bytes]. With its result and model it fits into one frame.
 inline constexpr std::size_t kMaxTraceBytes =
     kMaxFrameBytes - kMaxResultBytes - (std::size_t{64} << 10U);
 
-/// Why a received trace is invalid, or an empty text. `shape` and `with_fall` are those of the
-/// request.
+/// Returns why a received trace is invalid, or an empty text. `shape` and `with_fall` are as
+/// requested.
 std::string fault_of_trace(const Trace& trace, const solver::TraceShape& shape, bool with_fall);
 
 void set_protocol(WorkerHello& hello);
 
-/// Names of the scalars that this build sends and expects, in order, separated by spaces.
+/// Returns the names of the scalars that this build sends and expects, separated by spaces.
 std::string sent_outputs();
 
-/// Why the server refuses that worker, or an empty text: it has another protocol version, or its
-/// results have other outputs.
+/// Returns why the server refuses the worker, or an empty text. The worker may have another
+/// protocol version, or its results other outputs.
 std::string hello_error(const WorkerHello& hello);
 
-/// Number of points that are solved, failed or left out by a filter.
+/// Returns the number of points that are solved, failed or left out by a filter.
 inline std::uint64_t completed_points(const StudyStatus& study) {
   return study.solved() + study.failed() + study.left_out();
 }
 
-/// Number of all other points. The filter may still leave out some of them.
+/// Returns the number of points that are not completed. A filter may still leave out some of them.
 inline std::uint64_t open_points(const StudyStatus& study) {
   return study.points() - completed_points(study);
 }

@@ -25,7 +25,7 @@ std::string read_small_file(const std::string& path, std::string_view what,
   if (S_ISCHR(about.st_mode) && about.st_rdev == makedev(1, 3)) {
     return {};
   }
-  if (!S_ISREG(about.st_mode)) {  // opening a pipe would block
+  if (!S_ISREG(about.st_mode)) {  // opening a pipe could block
     refuse(fmt::format("it is {}, and must be a regular file of at most {} bytes",
                        kind_of_file(about.st_mode), most_bytes));
   }
@@ -33,7 +33,7 @@ std::string read_small_file(const std::string& path, std::string_view what,
     refuse(fmt::format("it has {} bytes, and at most {} are allowed", about.st_size, most_bytes));
   }
   std::ifstream file;
-  file.rdbuf()->pubsetbuf(nullptr, 0);  // a buffer would keep a copy of a secret in the file
+  file.rdbuf()->pubsetbuf(nullptr, 0);  // a buffer could keep a copy of a secret in the file
   file.open(path, std::ios::binary);
   std::string text(static_cast<std::size_t>(about.st_size), '\0');
   if (!file.is_open() || file.read(text.data(), about.st_size).bad()) {

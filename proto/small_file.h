@@ -8,12 +8,12 @@
 
 namespace oblique::protocol {
 
-/// Reads a regular file of at most `most_bytes`; /dev/null is empty. Does not block on a pipe.
-/// Throws solver::InputError for other files; its message begins with `what`, as "the key file",
-/// and `path`.
+/// Reads a regular file of at most `most_bytes`; /dev/null counts as empty. Does not block on a
+/// pipe. Throws solver::InputError for other files; its message begins with `what`, such as "the
+/// key file", and `path`.
 std::string read_small_file(const std::string& path, std::string_view what, std::size_t most_bytes);
 
-/// The kind of a file with this `st_mode`, as "a pipe".
+/// Returns the kind of a file with this `st_mode`, such as "a pipe".
 inline const char* kind_of_file(mode_t mode) {
   return S_ISREG(mode)    ? "a regular file"
          : S_ISDIR(mode)  ? "a directory"

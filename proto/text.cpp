@@ -61,7 +61,7 @@ std::string visible_but(std::string_view text, std::string_view kept) {
   return shown;
 }
 
-// Levenshtein's distance, one row of its table at a time.
+// Levenshtein's distance, computed one row of its table at a time.
 std::size_t distance(std::string_view a, std::string_view b) {
   const auto lower = [](char letter) { return std::tolower(static_cast<unsigned char>(letter)); };
   std::vector<std::size_t> row(b.size() + 1);
@@ -98,7 +98,7 @@ Character first_character(std::string_view text) {
     }
     code = (code << 6U) | (byte & 0x3fU);
   }
-  // Overlong, half of a UTF-16 pair, or above the last code point.
+  // Invalid: a code point that is encoded too long, half of a UTF-16 pair, or above the last one.
   constexpr std::array<char32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
   const bool is_sound =
       code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;
@@ -157,12 +157,12 @@ std::string_view nearest(std::string_view word, std::span<const std::string_view
   std::string_view best;
   std::size_t best_distance = std::max<std::size_t>(1, word.size() / 2) + 1;
   for (const auto candidate : candidates) {
-    // The distance is at least the difference of the lengths.
+    // The distance cannot be less than the difference of the lengths.
     if (word.size() >= candidate.size() + best_distance) {
       continue;
     }
     const std::size_t candidate_distance = distance(word, candidate);
-    // No suggestion if the words share no letter.
+    // Nothing is suggested if the two words have no letter in common.
     if (candidate_distance < best_distance &&
         candidate_distance < std::max(word.size(), candidate.size())) {
       best_distance = candidate_distance;

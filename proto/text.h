@@ -15,40 +15,40 @@ namespace oblique::protocol {
 /// .
 std::string visible(std::string_view text);
 
-/// As `visible`, but keeps line breaks, for messages of several lines.
+/// Works like `visible`, but keeps line breaks, for messages of several lines.
 std::string visible_lines(std::string_view text);
 
-/// Whether `visible` would not change `text`.
+/// Returns whether `visible` would leave `text` unchanged.
 bool is_visible(std::string_view text);
 
-/// Whether all of `text` is UTF-8.
+/// Returns whether all of `text` is UTF-8.
 bool is_utf8(std::string_view text);
 
-/// The first characters of a UTF-8 text, at most `bytes` in all.
+/// Returns the first characters of a UTF-8 text, at most `bytes` bytes in all.
 std::string shortened(const std::string& text, std::size_t bytes);
 
-/// At most `bytes` of visible(text), for an error message, followed by "..." if it was cut.
+/// Returns at most `bytes` bytes of visible(text), for an error message, and "..." if it was cut.
 std::string excerpt(std::string_view text, std::size_t bytes = 80);
 
-/// The parts of `text` between separators, empty ones included.
+/// Returns the parts of `text` between separators. Parts may be empty.
 std::vector<std::string_view> split(std::string_view text, char separator);
 
-/// Length [bytes] and code point of the UTF-8 character at the start of `text`; length 0 if there
-/// is none.
+/// Length [bytes] and code point of the UTF-8 character at the start of a text. The length is 0 if
+/// there is no valid character.
 struct Character {
   std::size_t bytes;
   char32_t code;
 };
 Character first_character(std::string_view text);
 
-/// The candidate with the smallest edit distance to `word`, ignoring case; empty if none is close
-/// enough to be a likely slip.
+/// Returns the candidate with the smallest edit distance to `word`, ignoring case; empty if no
+/// candidate is so close that `word` may be a misspelling of it.
 std::string_view nearest(std::string_view word, std::span<const std::string_view> candidates);
 
-/// " (did you mean `x`?)" with the nearest candidate, or an empty text.
+/// Returns " (did you mean `x`?)" with the nearest candidate, or an empty text.
 std::string did_you_mean(std::string_view word, std::span<const std::string_view> candidates);
 
-/// "unknown key `muu` (did you mean `mu`?)".
+/// Returns a message such as "unknown key `muu` (did you mean `mu`?)".
 std::string unknown_key(std::string_view name, std::span<const std::string_view> known);
 
 std::string joined(std::span<const std::string_view> names);

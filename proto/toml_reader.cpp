@@ -14,8 +14,7 @@
 namespace oblique::protocol {
 namespace {
 
-/// A value as written in the file. Inside a list or table, nested lists and tables appear as their
-/// kind only.
+/// Returns a value as written in the file. Nested lists and tables are shown only by their kind.
 std::string element(const toml::node& node, bool is_nested) {
   std::vector<std::string> parts;
   if (is_nested && (node.is_array() || node.is_table())) {
@@ -67,10 +66,11 @@ std::string toml_string(std::string_view text) {
 }
 
 toml::table TomlReader::parse(std::string_view text) const {
-  constexpr std::size_t kLongestError = 150;  // messages of toml++ end with a key of any length
+  constexpr std::size_t kLongestError = 150;  // messages of toml++ may contain long keys
   constexpr std::size_t kMaxKeyParts = 100;
-  // Tables nest as deep as their keys have parts, and their destructors recurse. This check runs
-  // before parsing, so dots in any text without a comma or an equals sign count too.
+  // The nesting of tables equals the number of parts of their keys, and destructors of tables
+  // recurse. This check runs before parsing, so it also counts dots in other text without a comma
+  // or an equals sign.
   std::size_t parts = 1;
   std::size_t line = 1;
   for (const char c : text) {

@@ -10,8 +10,8 @@
 
 namespace oblique::worker {
 
-/// A batch with the points of its study. Positions, from 0 to size(), number its points in the
-/// order in which they are solved.
+/// A batch with the points of its study. Its points are solved in the order of their positions,
+/// which count from 0.
 class Batch {
  public:
   /// The points from `begin` to `end` - 1.
@@ -19,7 +19,7 @@ class Batch {
     std::uint64_t begin;
     std::uint64_t end;
   };
-  /// `number` is unique in this worker; lease numbers are not, after a restart of the server.
+  /// `number` is unique in this worker. Lease numbers are not: a restarted server repeats them.
   Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Range>& ranges,
         std::shared_ptr<const protocol::PointTable> points);
 
@@ -31,11 +31,11 @@ class Batch {
   std::uint64_t point_at(std::uint64_t position) const {
     return points_from(position, size_).begin;
   }
-  /// The first position in [at, end) whose point the filter keeps, or `end`.
+  /// The first position in [at, end) whose point passes the filter, or `end`.
   std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;
-  /// Appends the points at the positions [begin, end) to `ranges`; the last range may grow.
+  /// Adds the points at the positions [begin, end) to `ranges`. May extend the last range.
   void append_points(std::uint64_t begin, std::uint64_t end, std::vector<Range>& ranges) const;
-  /// The position after consecutive points, from `position` on, of one model.
+  /// The position after the consecutive points of one model that begin at `position`.
   std::uint64_t end_of_model(std::uint64_t position) const;
 
  private:
@@ -43,18 +43,18 @@ class Batch {
     std::uint64_t position;
     std::uint64_t point;
   };
-  /// Consecutive points from `position` on, at most up to the position `end`.
+  /// The consecutive points that begin at `position`, at most up to the position `end`.
   Range points_from(std::uint64_t position, std::uint64_t end) const;
 
   std::uint64_t number_;
   std::uint64_t study_id_;
-  std::vector<Run> runs_;  ///< each up to the position of the next one
+  std::vector<Run> runs_;  ///< consecutive points, up to the position of the next run
   std::uint64_t size_ = 0;
   std::shared_ptr<const protocol::PointTable> points_;
 };
 
-/// The ranges of a message. Nothing unless each has points, all of a study of `study_points`, and
-/// together no more than that.
+/// The ranges of a message. Returns nothing if a range is empty or not within a study of
+/// `study_points`, or if the ranges together have more points than the study.
 std::optional<std::vector<Batch::Range>> ranges_of(const protocol::Batch& message,
                                                    std::uint64_t study_points);
 
@@ -63,9 +63,9 @@ struct Progress {
   std::uint64_t batch;
   std::uint64_t study_id;
   std::vector<protocol::PointResult> results = {};
-  double busy_s = 0.0;                      ///< time spent on them
-  bool batch_done = false;                  ///< no more will come
-  std::vector<Batch::Range> left_out = {};  ///< points that a filter leaves out
+  double busy_s = 0.0;                      ///< time spent on the results
+  bool batch_done = false;                  ///< the batch has no further points
+  std::vector<Batch::Range> left_out = {};  ///< points that did not pass the filter
 };
 
 }  // namespace oblique::worker

@@ -22,7 +22,6 @@ class BatchSolver::Task : public solver::PointSource {
       batch_.append_points(next_, found, left_out_);
       next_ = found;
       if (next_ < end_) {
-        // Points may be slow: the rest of a dropped task is not solved.
         return open_.dropped ? std::nullopt : std::optional(next_++);
       }
     } while (take_more());
@@ -57,10 +56,10 @@ class BatchSolver::Task : public solver::PointSource {
     }
   }
 
-  /// Needs the lock.
+  /// Moves the results to the solver. The caller must hold the lock.
   void pass_on() {
     if (results_.empty() && left_out_.empty()) {
-      return;  // the time so far belongs to the next results
+      return;  // the time so far is added to the next results
     }
     const Clock::time_point now = Clock::now();
     if (!open_.unwanted) {
@@ -77,7 +76,7 @@ class BatchSolver::Task : public solver::PointSource {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// Takes the next part of the batch, of which a filter may keep no point. False at its end.
+  /// Takes the next part of the batch, all of which a filter may leave out. False at the end.
   bool take_more() {
     std::unique_lock lock(solver_.mutex_);
     pass_on();
@@ -96,7 +95,7 @@ class BatchSolver::Task : public solver::PointSource {
   }
 
   BatchSolver& solver_;
-  OpenBatch& open_;  ///< stays while a thread works on it
+  OpenBatch& open_;  ///< not removed while a thread works on it
   const Batch& batch_;
   std::uint64_t next_ = 0;                       ///< position
   std::uint64_t end_ = 0;                        ///< after the last position
@@ -145,7 +144,7 @@ void BatchSolver::drop_all() {
   drop([](const OpenBatch&) { return true; });
 }
 
-/// Removes batches, those in work when the last thread leaves them. Needs the lock.
+/// Removes batches at once, or when their last thread leaves them. The caller must hold the lock.
 void BatchSolver::drop(const std::function<bool(const OpenBatch&)>& is_to_drop) {
   open_.remove_if([&](OpenBatch& open) {
     open.dropped = open.dropped || is_to_drop(open);

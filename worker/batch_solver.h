@@ -19,17 +19,17 @@
 
 namespace oblique::worker {
 
-/// Solves batches, in the order in which they were added, on threads of its own (README.md). Points
-/// that a filter leaves out are reported, not solved.
+/// Solves batches on several threads, in the order in which they were added (README.md). Points
+/// that do not pass the study's filter are reported, not solved.
 class BatchSolver {
  public:
-  /// Solves the points that the source gives and passes the outcomes on, in any order. Numbers of
-  /// points are positions in the batch. Called by several threads at once; must not throw.
+  /// Solves the points of the source and passes on the outcomes in any order. Points are numbered
+  /// by their position in the batch. Called by several threads at once; must not throw.
   using SolvePoints =
       std::function<void(const Batch&, solver::PointSource&, const solver::TakeOutcome&)>;
 
-  /// A solving thread calls `batch_ended` after the last point of a batch; it must not call this
-  /// object. `threads` is at least 1.
+  /// A solving thread calls `batch_ended` after the last point of a batch. `batch_ended` must not
+  /// call this object.
   BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads = 1);
 
   /// Waits for the points that are being solved.
@@ -39,16 +39,16 @@ class BatchSolver {
 
   /// Drops the batches of a study and their results that were not collected.
   void drop_study(std::uint64_t study_id);
-  /// Drops a batch, or all; their results can still be collected. Ignores an unknown number.
+  /// Drops one batch or all; their results can still be collected. Ignores unknown numbers.
   void drop_batch(std::uint64_t number);
   void drop_all();
 
-  /// While paused, no further point begins.
+  /// While paused, no thread begins another point.
   void set_paused(bool paused);
 
   bool is_solving() const;
 
-  /// Results since the last call, by batch. Threads pass results on after 20 ms at the latest.
+  /// Results since the last call, by batch. Threads hold results back for about 20 ms at most.
   std::vector<Progress> collect();
 
  private:
@@ -56,14 +56,13 @@ class BatchSolver {
     explicit OpenBatch(Batch&& opened) : batch(std::move(opened)) {}
 
     const Batch batch;
-    std::uint64_t given = 0;  ///< positions that threads have taken
-    std::size_t solvers = 0;  ///< threads that work on it
-    /// No further point begins. Set under the lock, read before each point without it.
-    std::atomic<bool> dropped = false;
-    bool unwanted = false;  ///< its results are dropped too
+    std::uint64_t given = 0;            ///< number of positions that threads have taken
+    std::size_t solvers = 0;            ///< number of threads that work on the batch
+    std::atomic<bool> dropped = false;  ///< written under the lock, read without it
+    bool unwanted = false;              ///< results are dropped too
   };
   using OpenBatches = std::list<OpenBatch>;
-  class Task;  ///< the part of a batch that one thread solves, and then the next part
+  class Task;  ///< the points that one thread solves, part by part
 
   void work(const std::stop_token& stop);
   OpenBatches::iterator next_batch();

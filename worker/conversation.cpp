@@ -1,6 +1,5 @@
 #include "worker/conversation.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -11,7 +10,7 @@
 namespace oblique::worker {
 namespace {
 
-// Bounds on the intervals that a server sets, so that heartbeats neither flood it nor cease.
+// Bounds on the heartbeat interval that a server requests.
 constexpr std::int64_t kShortestInterval_ms = 10;
 constexpr std::int64_t kLongestInterval_ms = 600'000;
 
@@ -41,17 +40,13 @@ const protocol::Results* Outbox::next_to_send() {
 
 template <class Predicate>
 void Outbox::remove(const Predicate& is_unwanted) {
-  std::size_t number = 0;
-  while (number < messages_.size()) {
-    const Message& message = messages_[number];
-    if (!is_unwanted(message.results)) {
-      ++number;
-      continue;
+  for (std::size_t i = messages_.size(); i-- > 0;) {
+    if (const Message& message = messages_[i]; is_unwanted(message.results)) {
+      results_ -= static_cast<std::size_t>(message.results.results_size());
+      bytes_ -= message.bytes;
+      on_their_way_ -= i < on_their_way_ ? 1U : 0U;
+      messages_.erase(messages_.begin() + static_cast<std::ptrdiff_t>(i));
     }
-    results_ -= static_cast<std::size_t>(message.results.results_size());
-    bytes_ -= message.bytes;
-    on_their_way_ -= number < on_their_way_ ? 1U : 0U;
-    messages_.erase(messages_.begin() + static_cast<std::ptrdiff_t>(number));
   }
 }
 
@@ -170,7 +165,6 @@ Effects Conversation::on_time(std::int64_t now_ms) {
   exit_if_due();
   const bool is_over = now_ms_ >= deadline_ms_;
   if (state_ == State::kGreeting && is_over) {
-    // On a slow connection, handshake and hello may take longer than the timeout.
     hello_timeout_ms_ = settings_.hello_timeout.after(hello_timeout_ms_);
     if (!std::exchange(has_warned_, true)) {
       note(fmt::format(
@@ -194,7 +188,8 @@ std::int64_t Conversation::next_deadline_ms() const {
   if (state_ == State::kFinished) {
     return kNever_ms;
   }
-  const std::int64_t stop_ms = stopping_ ? stop_deadline_ms_ : std::min(exit_ms(), idle_exit_ms());
+  const std::int64_t stop_ms =
+      stopping_ ? stop_deadline_ms_ : std::min(settings_.exit.stop_ms, idle_exit_ms());
   const std::int64_t heartbeat_ms = state_ == State::kWelcomed ? heartbeat_due_ms_ : kNever_ms;
   return std::min({deadline_ms_, stop_ms, heartbeat_ms});
 }
@@ -248,7 +243,7 @@ void Conversation::handle(const protocol::ServerToWorker& message) {
       backoff_ms_ = 0;
       return;
     case Kind::kStopping:
-      // Solving goes on. The socket reconnects when the server is back, which sends HelloAgain.
+      // Solving continues. The socket reconnects to the restarted server, which sends HelloAgain.
       server_stopping_ = true;
       return note("the server stops");
     case Kind::kNotice:
@@ -305,7 +300,7 @@ void Conversation::on(const protocol::StudyDefinition& definition) {
     studies_[definition.study_id()] =
         std::make_shared<const protocol::PointTable>(definition.recipe());
   } catch (const solver::InputError& error) {
-    // The server accepted this recipe, so the releases differ: that is no fault of the points.
+    // The server accepted this recipe, so its release differs. Points must not fail for that.
     finish(1, fmt::format("study {} cannot be read: install the same release on server and "
                           "worker. {}",
                           definition.study_id(), error.what()));
@@ -372,10 +367,10 @@ Effects Conversation::on_progress(std::vector<Progress> progress, std::int64_t n
 
 void Conversation::report(Progress& progress) {
   if (progress.batch < first_batch_of_database_) {
-    return;  // in this database the study's id is that of another study
+    return;  // in the new database this id belongs to another study
   }
   const auto found = held_.find(progress.batch);
-  const bool has_lease = found != held_.end();  // not for batches of an earlier session
+  const bool has_lease = found != held_.end();  // false for batches of an earlier session
   const Held held = has_lease ? found->second : Held{progress.study_id, 0, 0};
   const auto new_message = [&] {
     protocol::Results results;
@@ -389,7 +384,7 @@ void Conversation::report(Progress& progress) {
                                  : progress.busy_s / static_cast<double>(progress.results.size());
   protocol::Results results = new_message();
   results.set_busy_s(progress.results.empty() ? progress.busy_s : 0.0);
-  // Without a lease the server does not accept points left out, and leases them again.
+  // Without a lease the server ignores ranges of filtered points and leases these points again.
   for (std::size_t i = 0; has_lease && i < progress.left_out.size(); ++i) {
     if (results.left_out_size() >= 2 * protocol::kMaxLeftOutRanges) {
       add_results(std::exchange(results, new_message()));
@@ -443,7 +438,6 @@ void Conversation::deliver() {
 
 void Conversation::give_credit() {
   const auto occupied = static_cast<std::uint32_t>(held_.size()) + open_credit_;
-  // The server must not lease points again whose results still wait here.
   if (state_ != State::kWelcomed || stopping_ || server_stopping_ || outbox_.has_waiting() ||
       !may_solve() || occupied >= settings_.batches_held) {
     return;
@@ -503,7 +497,7 @@ void Conversation::begin_stop(const std::string& reason, int exit_code) {
   stop_reason_ = reason;
   stop_exit_code_ = exit_code;
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
-  // The server must not lease points again whose results still wait here.
+  // The server leases returned points again, so their results must have been sent.
   if (!outbox_.has_waiting() && !held_.empty()) {
     protocol::WorkerMessage message;
     for (const auto& [number, held] : held_) {
@@ -541,23 +535,12 @@ void Conversation::finish(int exit_code, const std::string& reason) {
   effects_.emplace_back(Finish{exit_code, reason + lost});
 }
 
-std::int64_t Conversation::exit_ms() const {
-  const ExitSettings& exit = settings_.exit;
-  return exit.until_ms == kNever_ms ? kNever_ms : exit.until_ms - exit.shutdown_grace_ms;
-}
-
-std::int64_t Conversation::idle_exit_ms() const {
-  const std::int64_t idle_ms = settings_.exit.idle_exit_ms;
-  return idle_ms == kNever_ms ? kNever_ms : last_work_ms_ + idle_ms;
-}
-
-/// Stops the worker at its time or when idle. A worker that was never welcomed exits with 1, so
-/// that whoever started it notices.
+/// Stops the worker at `stop_ms` or when idle; with exit code 1 if no server ever welcomed it.
 void Conversation::exit_if_due() {
   if (!held_.empty() || !outbox_.is_empty()) {
     last_work_ms_ = now_ms_;
   }
-  const bool is_time = now_ms_ >= exit_ms();
+  const bool is_time = now_ms_ >= settings_.exit.stop_ms;
   if (stopping_ || state_ == State::kFinished || (!is_time && now_ms_ < idle_exit_ms())) {
     return;
   }

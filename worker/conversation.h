@@ -20,7 +20,7 @@ namespace oblique::worker {
 
 // ---- Effects, which the session carries out -----------------------------------------------------
 
-/// Close the socket, if there is one, with all queued messages, and open a new one.
+/// Opens a new socket; closes the present one and drops its queued messages.
 struct Connect {
   std::string reason;  ///< empty for the first one
 };
@@ -30,16 +30,14 @@ struct Send {
 struct Solve {
   Batch batch;
 };
-/// Drop the batches of the study.
 struct DropStudy {
   std::uint64_t study_id;
 };
 struct DropBatch {
   std::uint64_t number;
 };
-/// Drop all batches and traces.
+/// Drops all batches and traces.
 struct DropAll {};
-/// Solve that point for a trace, beside the batches.
 struct SolveTrace {
   protocol::TraceOrder order;
 };
@@ -51,7 +49,6 @@ struct Note {
   std::string text;
   bool is_warning = false;
 };
-/// The conversation is over.
 struct Finish {
   int exit_code;
   std::string reason;
@@ -67,9 +64,7 @@ struct OutboxLimits {
   /// Solving pauses while this many results, or bytes of them, are not acknowledged.
   std::size_t unacknowledged_results = 50'000;
   std::size_t unacknowledged_bytes = std::size_t{64} << 20U;
-  /// Messages sent and not acknowledged; others wait. This spares a server that was away from
-  /// receiving all results at once.
-  std::size_t messages_on_their_way = 128;
+  std::size_t messages_on_their_way = 128;  ///< sent and not acknowledged; further ones wait
 };
 
 /// Results that the server has not acknowledged, in the order of their sequence numbers.
@@ -77,15 +72,13 @@ class Outbox {
  public:
   explicit Outbox(const OutboxLimits& limits) : limits_(limits) {}
 
-  /// Keeps the results, under the next sequence number.
   void add(protocol::Results results);
-  /// The next results to send, which count as sent; null if none wait or enough are on their way.
+  /// Returns the next results to send and counts them as sent. Null if none may be sent now.
   const protocol::Results* next_to_send();
-  /// Removes the results with that number, if there are any.
   void acknowledged(std::uint64_t sequence);
   void drop_study(std::uint64_t study_id);
   void drop_all();
-  /// All results wait again and belong to no lease.
+  /// Marks all results as not sent and as of no lease.
   void start_over();
 
   bool is_empty() const { return messages_.empty(); }
@@ -94,7 +87,7 @@ class Outbox {
     return results_ >= limits_.unacknowledged_results || bytes_ >= limits_.unacknowledged_bytes;
   }
   std::size_t results() const { return results_; }
-  /// Adds the lease of each message; 0 for none.
+  /// Adds the lease of each message, 0 for none, to `leases`.
   void add_leases(std::set<std::uint64_t>& leases) const;
 
  private:
@@ -102,7 +95,6 @@ class Outbox {
     protocol::Results results;
     std::size_t bytes;
   };
-  /// Removes the messages for which the predicate holds.
   template <class Predicate>
   void remove(const Predicate& is_unwanted);
 
@@ -110,23 +102,23 @@ class Outbox {
   std::deque<Message> messages_;
   std::size_t results_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t on_their_way_ = 0;  ///< the first messages
+  std::size_t on_their_way_ = 0;  ///< number of messages, the oldest ones
   std::uint64_t next_sequence_ = 1;
 };
 
 // ---- The conversation ---------------------------------------------------------------------------
 
-inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max();
+/// Later than any time; a time can be added without overflow.
+inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max() / 2;
 
-/// When a worker ends by itself.
+/// When a worker stops by itself.
 struct ExitSettings {
-  std::int64_t until_ms = kNever_ms;      ///< end of the process, by the clock of `now_ms`
-  std::string until = {};                 ///< the same as the user wrote it
+  std::int64_t stop_ms = kNever_ms;       ///< by the clock of `now_ms`
+  std::string until = {};                 ///< the end of the process as the user wrote it
   std::int64_t idle_exit_ms = kNever_ms;  ///< longest time without work
-  std::int64_t shutdown_grace_ms = 3000;  ///< it stops this long before `until_ms`
 };
 
-/// A time that doubles after each failure, from the first to the second one.
+/// A pause or timeout that doubles after each failure.
 struct Doubling {
   std::int64_t shortest_ms;
   std::int64_t longest_ms;
@@ -137,7 +129,7 @@ struct Doubling {
 };
 
 struct ConversationSettings {
-  std::uint32_t batches_held = 2;  ///< one is solved, the other waits
+  std::uint32_t batches_held = 2;  ///< one is being solved, one waits
   OutboxLimits outbox = {};
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< a larger result has its own message
@@ -146,36 +138,34 @@ struct ConversationSettings {
   Doubling backoff{50, 2000};           ///< pause between failures
   Doubling rejection{2000, 30'000};     ///< pause after the server rejects the socket
   std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
-  /// A request to stop this soon after the first is the same request: Slurm sends SIGTERM twice
-  /// within milliseconds to jobs that it preempts.
-  std::int64_t stop_repeats_ms = 1000;
+  std::int64_t stop_repeats_ms = 1000;  ///< a second request to stop is ignored until then
   ExitSettings exit = {};
 };
 
-/// The worker's side of the protocol (proto/protocol.md): decides what follows from messages,
-/// solved points and time. It has no I/O, clock or thread. `now_ms` may be of any clock that never
-/// runs backwards. README.md has the table of states and events.
+/// The worker's side of the protocol (proto/protocol.md): turns messages, solved points and time
+/// into effects. It has no I/O, clock or thread. `now_ms` is the time of any clock that never runs
+/// backwards. README.md has the table of states and events.
 class Conversation {
  public:
-  /// `server` is its address, for messages.
+  /// `server` is the address of the server, for log lines.
   Conversation(protocol::WorkerHello hello, ConversationSettings settings,
                std::string server = "the server");
 
-  /// Call it first, once.
+  /// Must be called once, before the other functions.
   Effects start(std::int64_t now_ms);
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
   Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
-  /// A message could not be sent. The messages after it in the same effects must not be sent.
+  /// For a message that could not be sent. The caller drops the later messages of these effects.
   Effects on_send_failed(std::int64_t now_ms);
-  /// The server rejected the socket, for a reason that a person must resolve.
+  /// For a socket that the server rejected. Only a person can remove the cause.
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
-  /// Call it at `next_deadline_ms` or a little later.
+  /// Must be called at `next_deadline_ms` or soon after.
   Effects on_time(std::int64_t now_ms);
   /// Gives back unsolved points, delivers results, says goodbye and finishes. A second call after
   /// `stop_repeats_ms` finishes at once.
   Effects stop(std::int64_t now_ms);
-  /// The state in words, for a service manager.
+  /// The state in words, for systemd.
   std::string status() const;
 
   std::int64_t next_deadline_ms() const;
@@ -215,11 +205,9 @@ class Conversation {
   void note(std::string text, bool is_warning = false);
   void send_heartbeat();
   void give_credit();
-  /// Sends waiting results before it requests batches: the server must not lease their points
-  /// again.
+  /// Sends waiting results, then requests batches: the server must not lease their points again.
   void go_on();
-  std::int64_t exit_ms() const;
-  std::int64_t idle_exit_ms() const;
+  std::int64_t idle_exit_ms() const { return last_work_ms_ + settings_.exit.idle_exit_ms; }
   void exit_if_due();
   void begin_stop(const std::string& reason, int exit_code = 0);
   void finish_if_delivered();
@@ -232,18 +220,18 @@ class Conversation {
 
   State state_ = State::kWaiting;
   std::int64_t now_ms_ = 0;
-  std::int64_t deadline_ms_ = 0;  ///< of the state: no answer to hello, next attempt, server silent
+  std::int64_t deadline_ms_ = 0;  ///< end of the present state, unless the server sends a message
   std::int64_t hello_timeout_ms_;
   std::int64_t heartbeat_due_ms_ = 0;
   std::int64_t heartbeat_interval_ms_ = 1000;
   std::int64_t lost_after_ms_ = 3000;
-  std::int64_t backoff_ms_ = 0;   ///< 0: the last session did some work
-  std::int64_t rejected_ms_ = 0;  ///< last pause after a rejection; 0: welcomed since
-  std::string rejection_;         ///< reason of the last rejection; empty: welcomed since
+  std::int64_t backoff_ms_ = 0;   ///< next pause; 0 after a session that did some work
+  std::int64_t rejected_ms_ = 0;  ///< last pause after a rejection; 0 after a welcome
+  std::string rejection_;         ///< reason of the last rejection; empty after a welcome
   std::int64_t start_ms_ = 0;
   std::int64_t last_work_ms_ = 0;  ///< when it last had a batch, a trace or results to deliver
-  bool was_welcomed_ = false;      ///< ever
-  bool has_warned_ = false;        ///< that no server answers; since the last welcome
+  bool was_welcomed_ = false;      ///< at least once
+  bool has_warned_ = false;        ///< since the last welcome, that no server answers
   bool stopping_ = false;
   std::string stop_reason_;
   int stop_exit_code_ = 0;
@@ -258,7 +246,7 @@ class Conversation {
   std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches belong to another database
   std::uint32_t open_credit_ = 0;              ///< batches requested and not received yet
   Outbox outbox_;
-  Effects effects_;  ///< of the present call
+  Effects effects_;  ///< collected for the return value of the present call
 };
 
 }  // namespace oblique::worker

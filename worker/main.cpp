@@ -29,6 +29,7 @@
 #include "proto/system/available_memory.h"
 #include "worker/session.h"
 #include "worker/solver/fall_cache.h"
+#include "worker/solver/model/number.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/point_runs.h"
 #include "worker/solver/solve.h"
@@ -46,7 +47,7 @@ struct Options {
   SessionSettings session;
   oblique::protocol::LogSettings log;
   std::string keys;
-  std::uint64_t fall_memory_bytes = 0;  ///< 0: a part of the free memory
+  std::uint64_t fall_memory_bytes = 0;  ///< 0: an eighth of the free memory
   double idle_exit_s = 0.0;
   pid_t parent = 0;
 };
@@ -57,7 +58,7 @@ std::string host_name() {
   return host.data();
 }
 
-/// Why `name` cannot be shown on any terminal and sent in any message; else empty.
+/// Returns an error message for a name that terminals or messages cannot contain; else empty.
 std::string check_name(const std::string& name) {
   constexpr std::size_t kLongestName = 200;
   const bool is_plain =
@@ -68,7 +69,7 @@ std::string check_name(const std::string& name) {
 }
 
 /// Seconds from now to `text`, negative for the past: a time in UTC, as 2026-11-22T05:00:00Z, or a
-/// duration, as 90m. Nothing for other text.
+/// duration, as 90m. Nothing for other text. `text` must not be empty.
 std::optional<double> seconds_until(const std::string& text) {
   std::tm parts{};
   const char* const end = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
@@ -76,44 +77,39 @@ std::optional<double> seconds_until(const std::string& text) {
     const int day = parts.tm_mday;
     const std::chrono::duration<double> left =
         std::chrono::system_clock::from_time_t(timegm(&parts)) - std::chrono::system_clock::now();
-    // timegm makes a day that the month does not have one of the next month.
+    // timegm turns February 30 into a day of March.
     return parts.tm_mday == day ? std::optional(left.count()) : std::nullopt;
   }
   constexpr std::array kUnits_s{1.0, 60.0, 3600.0};
-  const std::size_t unit = std::string_view("smh").find(text.empty() ? ' ' : text.back());
-  double value = 0.0;
-  if (unit >= kUnits_s.size() ||
-      !CLI::detail::lexical_cast(text.substr(0, text.size() - 1), value) || !(value >= 0.0) ||
-      value * kUnits_s[unit] > kLongest_s) {
+  const std::size_t unit = std::string_view("smh").find(text.back());
+  const auto value = oblique::solver::number_of(std::string_view(text).substr(0, text.size() - 1));
+  if (unit >= kUnits_s.size() || !value || !(*value >= 0.0) ||
+      *value * kUnits_s[unit] > kLongest_s) {
     return std::nullopt;
   }
-  return value * kUnits_s[unit];
+  return *value * kUnits_s[unit];
 }
 
-std::string check_until(const std::string& text) {
-  return seconds_until(text) ? ""
-                             : fmt::format(
-                                   "\"{}\" must be a time in UTC, as "
-                                   "2026-11-22T05:00:00Z, or a duration, as 90m",
-                                   text);
-}
-
-/// Sets the times at which the worker exits. Returns what is wrong with them; else an empty text.
+/// Sets the times at which the worker stops: 3 s before the end that the user gave, or when idle.
+/// Returns an error message, or an empty text.
 std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
   constexpr double kSecond_ms = 1000.0;
+  constexpr double kTimeToStop_s = 3.0;
   if (idle_exit_s > 0.0) {
     exit.idle_exit_ms = std::max<std::int64_t>(std::llround(idle_exit_s * kSecond_ms), 1);
   }
   if (exit.until.empty()) {
     return {};
   }
-  const auto left_ms = std::llround(seconds_until(exit.until).value() * kSecond_ms);
-  const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  exit.until_ms = std::chrono::floor<std::chrono::milliseconds>(now).count() + left_ms;
-  return left_ms > exit.shutdown_grace_ms
-             ? ""
-             : fmt::format("--until {} must be more than {} s from now, the time to stop",
-                           exit.until, static_cast<double>(exit.shutdown_grace_ms) / kSecond_ms);
+  const double left_s = seconds_until(exit.until).value_or(0.0) - kTimeToStop_s;
+  exit.stop_ms =
+      std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1) +
+      std::llround(left_s * kSecond_ms);
+  return left_s > 0.0 ? ""
+                      : fmt::format(
+                            "--until \"{}\" must be a time in UTC, as 2026-11-22T05:00:00Z, or a "
+                            "duration, as 90m, more than {} s from now",
+                            exit.until, kTimeToStop_s);
 }
 
 int run_worker(Options options) {
@@ -151,7 +147,7 @@ int run_worker(Options options) {
     notifier.stopping("stopping", kLongestEnd);
   });
   if (session.is_solving()) {
-    // Points cannot be interrupted and may take long; their results are not needed.
+    // The points under way cannot be interrupted, and their results are not needed.
     spdlog::default_logger()->flush();
     std::_Exit(exit_code);
   }
@@ -182,8 +178,7 @@ void add_options(CLI::App& app, Options& options) {
       ->transform(CLI::AsSizeValue(false).description(""));
   app.add_option("--until", session.conversation.exit.until,
                  "Exit before this time: in UTC, as 2026-11-22T05:00:00Z, or from now, as 90m")
-      ->type_name("TIME")
-      ->check(check_until);
+      ->type_name("TIME");
   app.add_option("--idle-exit", options.idle_exit_s,
                  "Exit after this many seconds without work; 0: never")
       ->type_name("SECONDS")

@@ -16,13 +16,11 @@
 namespace oblique::worker {
 namespace {
 
-constexpr int kLinger_ms = 500;         ///< for the goodbye to be sent
-constexpr int kMessagesAtATime = 1000;  ///< then the loop does its other work
+constexpr int kLinger_ms = 500;         ///< maximum time to send the goodbye
+constexpr int kMessagesAtATime = 1000;  ///< maximum number received in one turn of the loop
 
 std::int64_t now_ms() {
-  using std::chrono::duration_cast;
-  using std::chrono::milliseconds;
-  return duration_cast<milliseconds>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
 }
 
 /// 128 random bits in hexadecimal digits.

@@ -19,21 +19,21 @@ namespace oblique::worker {
 
 /// Settings of the worker; help texts print the defaults from here.
 struct SessionSettings {
-  std::string server = "tcp://127.0.0.1:7601";  ///< its address for workers
-  std::string name;                             ///< for people
-  std::string host;                             ///< name of this machine, for people
-  std::size_t threads = 1;                      ///< that solve points
+  std::string server = "tcp://127.0.0.1:7601";  ///< the server's address for workers
+  std::string name;                             ///< of the worker, in lists
+  std::string host;                             ///< name of this machine, in lists
+  std::size_t threads = 1;                      ///< number of solving threads
   /// Called several times a second with the state in words.
   std::function<void(const std::string& status)> on_turn;
-  std::int64_t report_interval_ms = 100;      ///< longest time until solved points are sent
-  std::optional<protocol::KeyFile> key = {};  ///< none: plain text
+  std::int64_t report_interval_ms = 100;      ///< maximum delay before solved points are sent
+  std::optional<protocol::KeyFile> key = {};  ///< empty: no encryption
   ConversationSettings conversation;
 };
 
-/// Runs a worker: socket and heartbeats on the calling thread, solving on others.
+/// Runs a worker: the socket on the calling thread, solving on other threads.
 class Session {
  public:
-  /// Solves points of batches by `solve` and those of traces by `trace`. Does not connect yet.
+  /// `solve` solves points of batches, `trace` points of traces. Does not connect yet.
   Session(SessionSettings settings, BatchSolver::SolvePoints solve, TraceSolver::Solve trace = {});
 
   /// Runs until the worker is stopped or refused, and returns the exit code. A readable
@@ -41,11 +41,10 @@ class Session {
   /// be recognised. Throws solver::InputError unless `settings.server` is an address.
   int run(int stop_descriptor, const std::function<void()>& on_stop);
 
-  /// Whether a point is still being solved: the destructor would wait for it.
+  /// Whether a point is being solved. The destructor waits for its end.
   bool is_solving() const { return solver_.is_solving() || tracer_.is_solving(); }
 
  private:
-  /// The socket of the present attempt.
   struct Link {
     Link(zmq::context_t& context, const protocol::DealerSettings& settings)
         : socket(protocol::make_dealer(context, settings)), monitor(context, socket, settings) {}
@@ -63,9 +62,9 @@ class Session {
   const SessionSettings settings_;
   zmq::context_t context_;
   std::optional<Link> link_;
-  unsigned attempt_ = 0;      ///< to connect: selects IPv4 or IPv6 for a host with both
-  bool has_received_ = true;  ///< a message, over this socket
-  protocol::WakeUp news_;     ///< a batch ended, or a trace is ready
+  unsigned attempt_ = 0;      ///< number of the connection; selects IPv4 or IPv6 in turn
+  bool has_received_ = true;  ///< whether this socket has received a message
+  protocol::WakeUp news_;     ///< signalled when a batch ended or a trace is ready
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;

@@ -29,7 +29,7 @@ TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
 
 void TraceRows::add(const solver::TraceRow& row) {
   if (!rows_.empty() && !stays(rows_.back())) {
-    rows_.pop_back();  // kept only while it was the last
+    rows_.pop_back();  // the row was kept only as the last one
   }
   const bool falls = row.state == solver::kFalling;
   const bool is_always_kept = falls || solver::ends_phase(last_state_, row.state);
@@ -45,7 +45,7 @@ void TraceRows::add(const solver::TraceRow& row) {
     std::erase_if(rows_,
                   [this](const Row& kept) { return !stays(kept) && &kept != &rows_.back(); });
   }
-  if (rows_.size() > most_rows()) {  // further rows are only counted
+  if (rows_.size() > most_rows()) {  // counts the row only
     is_too_long_ = true;
     rows_.pop_back();
   }
@@ -138,7 +138,7 @@ protocol::Trace TraceSolver::solved(const protocol::TraceOrder& order) const {
   return trace;
 }
 
-/// Moves the trace of running_, once it is solved, to the answers.
+/// Moves a solved trace from running_ to the answers.
 void TraceSolver::gather() {
   if (running_.valid() && !is_solving()) {
     protocol::Trace trace = running_.get();

@@ -15,22 +15,21 @@
 
 namespace oblique::worker {
 
-/// The rows of a trace that its message has: the fall, each K-th instant of the contact, those at
-/// which phases end, and the last.
+/// Selects the rows of a trace for its message: the fall, each K-th instant of the contact, the
+/// ends of phases and the last instant.
 class TraceRows {
  public:
-  /// `every` is K. If it is 0, K is the smallest power of 2 for which the rows have at most
-  /// `most_bytes`.
+  /// `every` is K; for 0, K is the smallest power of 2 with which the rows fit in `most_bytes`.
   TraceRows(std::uint64_t every, std::size_t most_bytes);
 
   void add(const solver::TraceRow& row);
-  /// Moves the rows into the message. If they have more than `most_bytes`, it gets no rows but the
-  /// least `every` with which they would fit.
+  /// Moves the rows into the message. If they need more than `most_bytes`, the message gets no rows
+  /// but the smallest `every` with which they would fit.
   void move_to(protocol::Trace& trace);
 
  private:
   struct Row {
-    std::uint64_t instant;  ///< of the contact
+    std::uint64_t instant;  ///< its number in the contact
     bool is_always_kept;
     char state;
     std::vector<double> numbers;
@@ -44,34 +43,34 @@ class TraceRows {
   const std::size_t most_bytes_;
   std::size_t row_bytes_ = 1;
   std::uint64_t instants_ = 0;
-  std::uint64_t always_kept_ = 0;  ///< rows
+  std::uint64_t always_kept_ = 0;  ///< number of rows
   std::string last_state_;
   bool is_too_long_ = false;
   std::vector<Row> rows_;
 };
 
-/// Solves the point of an order with a fall from `falls` and passes its instants to `sink`. The
-/// result's number is 0. A wrong order gives a failed result.
+/// Solves the point of an order with a fall from `falls` and passes its instants to `sink`. Returns
+/// the result with the point number 0; a failed result for a wrong order.
 protocol::PointResult solve_trace(const protocol::TraceOrder& order,
                                   const solver::Tracing::Sink& sink, solver::FallCache& falls);
 
-/// Solves points for traces, one at a time, on a thread beside those of the batches.
+/// Solves points for traces, one at a time, on a thread of its own.
 class TraceSolver {
  public:
   /// Solves the point of an order and passes its instants to the sink. Must not throw.
   using Solve = std::function<protocol::PointResult(const protocol::TraceOrder&,
                                                     const solver::Tracing::Sink&)>;
 
-  /// Without `solve` no order is taken. `has_trace` is called when a trace can be collected, also
-  /// on the solving thread.
+  /// Without `solve` all orders are declined. `has_trace` is called when a trace can be collected,
+  /// on the calling or the solving thread.
   TraceSolver(Solve solve, std::function<void()> has_trace,
               std::size_t most_bytes = protocol::kMaxTraceBytes);
 
-  /// While an order is being solved, others are answered as not taken.
+  /// Declines the order if another one is being solved.
   void take(const protocol::TraceOrder& order);
-  /// The order will be answered as not taken when its point is solved. Ignores an unknown number.
+  /// Declines the order once its point is solved. Ignores unknown numbers.
   void cancel(std::uint64_t trace_id);
-  /// No order received so far will be answered.
+  /// Leaves all orders so far without an answer.
   void drop_all();
   bool is_solving() const;
   /// Answers since the last call.
@@ -86,7 +85,7 @@ class TraceSolver {
   const std::size_t most_bytes_;
   std::future<protocol::Trace> running_;
   std::uint64_t trace_id_ = 0;  ///< of running_
-  bool is_cancelled_ = false;   ///< running_ will be answered as not taken
+  bool is_cancelled_ = false;   ///< running_ will be declined
   bool is_dropped_ = false;     ///< running_ will not be answered
   std::vector<protocol::Trace> traces_;
   std::jthread thread_;  ///< last: it uses the other members and is waited for

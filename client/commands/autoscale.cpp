@@ -49,19 +49,19 @@ constexpr std::array<std::string_view, 1> kSystems{"slurm"};
 struct AutoscaleFlags {
   std::string system;
   JobLimits limits;
-  std::string script;            // empty: not given
+  std::string script;            // empty if not given
   std::string sbatch_arguments;  // separated by spaces
-  std::string job_name;          // empty: not given
+  std::string job_name;          // empty if not given
   double interval_s = 30.0;
   bool once = false;
   bool dry_run = false;
   SourceFlags source;
 };
 
-/// Finds and submits the Slurm jobs of one name through `squeue` and `sbatch`.
+/// Finds and submits the Slurm jobs that have a given name. It runs `squeue` and `sbatch`.
 class SlurmJobs {
  public:
-  /// Waiting for `squeue` ends when `keep_waiting` returns false.
+  /// A wait for `squeue` ends when `keep_waiting` returns false.
   SlurmJobs(std::string name, std::string script, const std::string& sbatch_arguments,
             std::function<bool()> keep_waiting)
       : name_(std::move(name)), keep_waiting_(std::move(keep_waiting)) {
@@ -75,7 +75,7 @@ class SlurmJobs {
 
   const std::string& name() const { return name_; }
 
-  /// Number of our jobs that are pending or running.
+  /// Returns the number of our jobs that are pending or running.
   std::size_t count() const {
     const auto list =
         run("squeue", {"--noheader", "--me", "--array", "--name=" + name_, "--format=%T"}, true);
@@ -98,7 +98,8 @@ class SlurmJobs {
   std::string run(const std::string& program, const std::vector<std::string>& arguments,
                   bool may_stop) const {
     try {
-      // SQUEUE_PARTITION and similar variables would hide jobs, and too many would be submitted.
+      // SQUEUE_PARTITION and similar variables are hidden from squeue, because they would hide jobs
+      // and this command would then submit too many.
       return output_of({.program = program, .arguments = arguments, .hidden_variables = "SQUEUE_"},
                        may_stop ? keep_waiting_ : nullptr);
     } catch (const ProgramNotFound&) {
@@ -112,7 +113,7 @@ class SlurmJobs {
   std::function<bool()> keep_waiting_;
 };
 
-/// The installed batch script; empty if none is installed.
+/// Returns the path of the installed batch script, or an empty path if none is installed.
 std::string installed_script() {
   const auto programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   const auto script =
@@ -120,8 +121,7 @@ std::string installed_script() {
   return std::filesystem::exists(script) ? script.string() : std::string();
 }
 
-/// Throws InputError if the script needs a variable that is not set; warns if a key file is
-/// missing.
+/// Throws InputError if the batch script needs an unset variable; warns if a key file is missing.
 void check_variables(Console& console, const AutoscaleFlags& flags, const std::string& script) {
   constexpr const char* kServer = "OBLIQUE_WORKER_SERVER";
   constexpr const char* kKeys = "OBLIQUE_WORKER_KEYS";
@@ -129,7 +129,7 @@ void check_variables(Console& console, const AutoscaleFlags& flags, const std::s
     return !environment_variable(variable).value_or("").empty();
   };
   const auto is_given = [&](const char* variable) {
-    // It may also be passed by --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=...".
+    // --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=..." may also set the variable.
     return is_set(variable) || flags.sbatch_arguments.find(variable) != std::string::npos;
   };
   constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
@@ -174,7 +174,7 @@ std::string checked_script(Console& console, const AutoscaleFlags& flags) {
   return script;
 }
 
-/// One round: submits the missing jobs; with `dry_run`, prints the sbatch command instead.
+/// Performs one round: submits the missing jobs or, with `dry_run`, prints the sbatch command.
 void submit_missing(Console& console, Connection& connection, const SlurmJobs& slurm,
                     const AutoscaleFlags& flags) {
   const auto open = open_points(connection.full_status());
@@ -196,8 +196,8 @@ void submit_missing(Console& console, Connection& connection, const SlurmJobs& s
   }
 }
 
-/// Runs `round` until a signal arrives. Throws an error of the first round. Reports later errors
-/// once and retries, because the server or Slurm may be unreachable for a while.
+/// Calls `round` repeatedly until a signal arrives. Throws if the first round fails. Reports later
+/// errors once and continues, because the server or Slurm may be unreachable for a while.
 void repeat(Console& console, const std::function<void()>& round, double interval_s,
             protocol::StopSignals& stop) {
   const std::chrono::nanoseconds interval(std::llround(interval_s * 1e9));
@@ -222,7 +222,7 @@ int autoscale(const AutoscaleFlags& flags, Console& console) {
   const auto server = connection_settings(console, flags.source);
   const auto script = checked_script(console, flags);
   const auto default_name = "oblique@" + server.server_url.substr(server.server_url.rfind('/') + 1);
-  protocol::StopSignals stop;  // before any thread starts
+  protocol::StopSignals stop;  // created before any thread starts
   const auto keep_waiting = [&stop] { return !stop.requested(); };
   Connection connection(server, keep_waiting);
   const SlurmJobs slurm(flags.job_name.empty() ? default_name : flags.job_name, script,
@@ -249,7 +249,7 @@ int autoscale(const AutoscaleFlags& flags, Console& console) {
 std::uint64_t open_points(const protocol::StatusReply& status) {
   std::uint64_t open = 0;
   for (const auto& study : status.studies()) {
-    // The server's reason for waiting if a study only lacks workers.
+    // The server gives this reason for a study that lacks only workers.
     const bool needs_workers = study.waits_for().empty() || study.waits_for() == "a worker";
     if (study.state() == "running" && needs_workers) {
       open += study.points() - std::min(study.points(), protocol::completed_points(study));

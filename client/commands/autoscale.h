@@ -7,19 +7,19 @@
 
 namespace oblique::client {
 
-/// How many jobs a cluster should run. Help texts print these defaults.
+/// Limits for the number of jobs on a cluster. Help texts print these defaults.
 struct JobLimits {
   std::size_t least = 0;                  ///< minimum number of jobs, even without open points
   std::size_t most = 1;                   ///< maximum number of jobs; not below `least`
   std::uint64_t points_per_job = 10'000;  ///< open points per job
 };
 
-/// Number of open points that more workers would help with: those of running studies, except
-/// studies that wait for something else, such as disk space.
+/// Returns the number of open points that more workers would help to solve: those of running
+/// studies, except studies that wait for something else, such as disk space.
 std::uint64_t open_points(const protocol::StatusReply& status);
 
-/// Number of jobs to submit: one per `points_per_job` open points, rounded up and within the
-/// limits, minus the pending and running jobs.
+/// Returns the number of jobs to submit: one per `points_per_job` open points, rounded up and
+/// within the limits, minus the pending and running jobs.
 std::size_t jobs_to_submit(std::uint64_t open_points, std::size_t jobs, const JobLimits& limits);
 
 }  // namespace oblique::client

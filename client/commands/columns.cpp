@@ -31,7 +31,8 @@ of lists, counted from 0, and the functions that `oblique query` accepts. Values
 Tables show short times in us or ms and slides in mm; the heading gives the unit. x points from the
 pin to the released tip, y up. Times of a contact count from touch.)";
 
-/// The columns that match `pattern`, all if it is empty. Throws solver::InputError if none match.
+/// Returns the columns that match `pattern`; an empty pattern matches all. Throws
+/// solver::InputError if none match.
 std::vector<server::Column> columns_like(const std::string& pattern) {
   auto columns = server::columns_and_functions();
   if (pattern.empty()) {
@@ -45,7 +46,7 @@ std::vector<server::Column> columns_like(const std::string& pattern) {
   std::vector<server::Column> found;
   std::copy_if(
       columns.begin(), columns.end(), std::back_inserter(found), [&](const server::Column& column) {
-        // A function is also found by its name without arguments.
+        // The pattern may also be the name of a function without its arguments.
         return column.name == pattern || fnmatch(pattern.c_str(), column.name.c_str(), 0) == 0 ||
                column.name.starts_with(pattern + "(");
       });
@@ -56,7 +57,7 @@ std::vector<server::Column> columns_like(const std::string& pattern) {
   return found;
 }
 
-/// Numbered columns as files have them: "R0x_N, R0y_N, R1x_N, ...".
+/// Returns the names of numbered columns as trace files contain them: "R0x_N, R0y_N, R1x_N, ...".
 std::string names_of(const solver::TraceColumn& column) {
   const std::size_t space = column.name.find(' ');
   if (space == std::string_view::npos) {

@@ -38,8 +38,8 @@ constexpr const char* kExamples = R"(Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 130 stopped by Ctrl-C (128 + number of the signal).)";
 
-/// Whether a line has a description at `column` that can be wrapped. Examples with a remark look
-/// the same; they begin with a command and are not wrapped.
+/// Wraps the description of a flag or command, which begins at `column`. Does not wrap examples
+/// with a remark, which have the same layout but begin with "oblique".
 std::string fitted_meaning(const std::string& line, std::size_t width, std::size_t column) {
   if (line.size() <= width || width <= column || line.size() <= column || line[column - 1] != ' ' ||
       line[column] == ' ' || line.starts_with("  oblique ")) {
@@ -77,13 +77,13 @@ void add_verbosity_flags(CLI::App& command, VerbosityFlags& flags) {
   }
 }
 
-/// The innermost command that was parsed, or the program itself.
+/// Returns the innermost command that was parsed, or the program itself.
 CLI::App& parsed_command(CLI::App& app) {
   const auto commands = app.get_subcommands();
   return commands.empty() ? app : parsed_command(*commands.front());
 }
 
-/// The command as it is typed: "oblique keys list".
+/// Returns the command as the user types it: "oblique keys list".
 std::string words_of(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   return parent == nullptr ? command.get_name() : words_of(*parent) + ' ' + command.get_name();
@@ -96,8 +96,8 @@ int wrong_usage(Console& console, const CLI::App& command, const std::string& me
   return kWrongUsage;
 }
 
-/// Our name for a command or flag of another program, if the nearest-name search cannot find it;
-/// else empty.
+/// Returns our name for a command that other programs have under this name and that is too
+/// different for the nearest-name search, or an empty text.
 std::string other_name_of(const std::string& command) {
   const std::map<std::string_view, const char*> names{
       {"server", "oblique-server"}, {"worker", "oblique-worker"}, {"list", "oblique studies"}};
@@ -128,7 +128,7 @@ int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
-/// Exit code of a program that SIGPIPE ended.
+/// Exit code after the reader of the output has closed it: that of a program ended by SIGPIPE.
 constexpr int kReaderGone = 128 + SIGPIPE;
 
 int carry_out(Console& console, const std::string& words, const Action& action) {
@@ -175,7 +175,7 @@ int execute(Console& console, CLI::App& app, const Action& action, const Verbosi
   return code;
 }
 
-/// Values that are column names are completed with the columns.
+/// For shell completion: values of flags that are column names.
 protocol::ValueWords columns_of_values() {
   std::vector<std::string> names;
   for (const auto& column : server::all_columns()) {
@@ -193,7 +193,7 @@ protocol::ValueWords columns_of_values() {
 
 std::string fitted_help(const std::string& help, std::size_t width, std::size_t column) {
   std::string text;
-  std::vector<std::string> sentences;  // the lines of a paragraph
+  std::vector<std::string> sentences;  // the lines of one paragraph
   const auto end_paragraph = [&] {
     const bool fits = std::ranges::all_of(
         sentences, [width](const std::string& line) { return line.size() <= width; });

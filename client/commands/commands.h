@@ -20,15 +20,15 @@ using protocol::kWrongUsage;
 /// Carries out the parsed command and returns the exit code. Empty until a command is parsed.
 using Action = std::function<int(Console& console)>;
 
-/// A command with the variables of its flags, which live as long as the command.
+/// A command with its flags. Their variables live as long as the command.
 template <class Flags>
 struct NewCommand {
   CLI::App& command;
   Flags& flags;
 };
 
-/// Adds a command. Parsing it sets `parsed` to a call of `run`. If `examples` is empty, the help
-/// shows those of `app`.
+/// Adds a command. When the command is parsed, `parsed` becomes a call of `run`. If `examples` is
+/// empty, the help shows the examples of `app`.
 template <class Flags>
 NewCommand<Flags> new_command(CLI::App& app, Action& parsed, const std::string& name,
                               const std::string& summary, const std::string& examples,
@@ -44,15 +44,15 @@ NewCommand<Flags> new_command(CLI::App& app, Action& parsed, const std::string& 
   return {*command, *flags};
 }
 
-// Each function adds commands with flags, help and examples to `app`.
+// Each of these functions adds commands with flags, help and examples to `app`.
 void add_solve(CLI::App& app, Action& parsed);
 void add_run(CLI::App& app, Action& parsed);
 void add_study(CLI::App& app, Action& parsed);
 void add_submit(CLI::App& app, Action& parsed);
-/// `status`, `watch` and `studies`.
+/// Adds `status`, `watch` and `studies`.
 void add_status(CLI::App& app, Action& parsed);
 void add_workers(CLI::App& app, Action& parsed);
-/// `cancel`, `pause`, `resume`, `retry`, `describe`, `rename` and `delete`.
+/// Adds `cancel`, `pause`, `resume`, `retry`, `describe`, `rename` and `delete`.
 void add_study_changes(CLI::App& app, Action& parsed);
 /// `query` and `sql`.
 void add_query(CLI::App& app, Action& parsed);
@@ -65,7 +65,7 @@ void add_converge(CLI::App& app, Action& parsed);
 void add_fit(CLI::App& app, Action& parsed);
 void add_sensitivity(CLI::App& app, Action& parsed);
 void add_uncertainty(CLI::App& app, Action& parsed);
-/// `merge`, `backup` and `check`.
+/// Adds `merge`, `backup` and `check`.
 void add_database_files(CLI::App& app, Action& parsed);
 void add_autoscale(CLI::App& app, Action& parsed);
 /// `keygen` and `keys`.
@@ -78,8 +78,8 @@ void add_map(CLI::App& app, Action& parsed);
 /// 128 + number of the signal that stopped the command.
 int run_command_line(Console& console, int argc, const char* const* argv);
 
-/// Wraps the help text of CLI11 to `width` characters. Descriptions continue at `column`, other
-/// sentences on the next line. Commands are not wrapped.
+/// Wraps help text from CLI11 to `width` characters. Descriptions continue at `column`, other
+/// sentences at the start of the next line. Commands are not wrapped.
 std::string fitted_help(const std::string& help, std::size_t width, std::size_t column);
 
 }  // namespace oblique::client

@@ -39,7 +39,7 @@ struct ConvergeFlags {
   PointFlags points;
   bool json = false;
   int coarsest = kCoarsest;
-  int finest = 0;  // 0: not given
+  int finest = 0;  // 0 if not given
   int halvings = 2;
 };
 
@@ -48,11 +48,11 @@ void note_levels(Console& console, const char* what, const std::vector<Level>& l
                                  levels.front().name, levels.back().name);
 }
 
-/// Results of the mesh and step refinements, which are solved together.
+/// Results of the mesh refinement and the step refinement, which are solved together.
 struct BothRefinements {
   Refinement mesh;
   Refinement step;
-  std::optional<SolvedLevel> exact_fall;  ///< empty if the fall has no fixed step
+  std::optional<SolvedLevel> exact_fall;  ///< empty if the tolerance does not control the fall
 };
 
 BothRefinements refined(Console& console, const std::vector<Level>& meshes,

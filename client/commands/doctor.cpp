@@ -45,11 +45,11 @@ is written or changed. Exit code 1 if there is an error: the server does not ans
 key, or the database cannot be read. `oblique check` searches a database for damage.)";
 
 struct DoctorFlags {
-  std::string database;  // empty: not given
+  std::string database;  // empty if not given
   SourceFlags source;
 };
 
-/// Prints each finding on a line as soon as it is made.
+/// Collects findings. Prints each finding at once, on its own line.
 class Diagnosis {
  public:
   explicit Diagnosis(std::ostream& out) : out_(out) {}
@@ -129,7 +129,7 @@ void check_processor(Diagnosis& diagnosis) {
   }
 }
 
-/// Processor time of this thread [s], which other programs do not change.
+/// Processor time of this thread [s]; other programs do not affect it.
 double cpu_time_s() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -137,11 +137,11 @@ double cpu_time_s() {
   return static_cast<double>(time.tv_sec) + kNano * static_cast<double>(time.tv_nsec);
 }
 
-/// Processor time [s] of a point with the preset `paper` in vector lanes, without its fall.
+/// Measures the processor time [s] per point of the preset `paper` in lanes, without the fall.
 double measured_point_s() {
   constexpr std::uint64_t kPoints = 600;
   const solver::Finger finger(solver::preset("paper"));
-  (void)finger.solve(1.0, 0.4, 1.0);  // solves the fall
+  (void)finger.solve(1.0, 0.4, 1.0);  // solves the fall in advance
   std::vector<solver::Point> points;
   for (std::uint64_t i = 0; i < kPoints; ++i) {
     const double part = static_cast<double>(i) / static_cast<double>(kPoints);
@@ -158,7 +158,7 @@ double measured_point_s() {
 
 void check_solver(Diagnosis& diagnosis) {
   const std::string set = solver::instruction_set();
-  // Measured on processors of 2023; see tests/bench/README.md.
+  // Reference times, measured on processors of 2023; see tests/bench/README.md.
   const double reference_s = set == "avx512" ? 0.07e-3 : set == "avx2" ? 0.12e-3 : 0.30e-3;
   constexpr double kSlow = 3.0;
   const double point_s = measured_point_s();
@@ -174,8 +174,7 @@ void check_solver(Diagnosis& diagnosis) {
   }
 }
 
-/// Checks the disk of the database `file`, which need not exist; false if its folder does not
-/// exist.
+/// Checks the disk of the database `file`, which may be missing. False if its folder is missing.
 bool check_disk(Diagnosis& diagnosis, const std::string& file) {
   constexpr const char* kCheck = "disk";
   std::error_code error;
@@ -238,7 +237,7 @@ void check_database(Diagnosis& diagnosis, const std::string& named_file) {
   }
 }
 
-/// False if a key file is named that cannot be used.
+/// Returns false if the flags name a key file that cannot be used.
 bool check_key(Diagnosis& diagnosis, const DoctorFlags& flags) {
   const std::string file = flags.source.keys.empty()
                                ? environment_variable("OBLIQUE_KEYS").value_or("")

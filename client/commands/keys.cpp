@@ -26,7 +26,7 @@ constexpr const char* kKeysExamples = R"(Examples:
 
 A running server applies a change within a second and closes the connections of a revoked key.)";
 
-/// Roles that a key in the list may have: all except the server's.
+/// Roles of the keys in a server's list: all roles except the server's own.
 constexpr std::array<std::string_view, 3> kRoles{"client", "worker", "reader"};
 
 constexpr const char* kKeygenExamples = R"(Examples:
@@ -41,10 +41,10 @@ server's key and the list on its machine. Copy the worker's key to machines that
 key to people who submit studies, and the reader's key to people who only read results.)";
 
 struct KeysFlags {
-  std::string folder;  // empty: not given
+  std::string folder;  // empty if not given
   std::string name;
   std::string role;
-  std::string public_key;  // empty: create a new pair
+  std::string public_key;  // empty: creates a new key pair
   std::string format{"table"};
 };
 
@@ -82,8 +82,8 @@ std::optional<protocol::KeyFile> key_in(const std::string& path) {
   }
 }
 
-/// Throws std::runtime_error with the remedy if the file contains a key for this server that is not
-/// in the list, because it was revoked.
+/// Throws std::runtime_error, with the remedy, if the file contains a key for this server that is
+/// not in the list because it was revoked.
 void check_not_revoked(const std::string& folder, const std::string& name) {
   const std::string path = protocol::key_file_in(folder, name);
   const std::string list = protocol::authorized_keys_in(folder);

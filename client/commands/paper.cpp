@@ -34,10 +34,10 @@ constexpr const char* kPaperExamples = R"(Examples:
 struct PaperFlags {
   std::string preset{"paper"};
   std::string study{"paper"};
-  std::string database;  // empty: solve the cases now
+  std::string database;  // empty: solves the cases now
   std::string format{"table"};
   bool modes = false;
-  std::string figures;  // folder; empty: tables
+  std::string figures;  // folder; empty: prints tables
 };
 
 protocol::Table rows_of_study(Source& source, const std::string& study) {
@@ -61,7 +61,7 @@ OwnCases cases_of(Console& console, const PublishedTable& published, const Paper
   return solved_cases(published, {&finger, 1}).front();
 }
 
-/// Writes the figures into the folder, which is created.
+/// Draws the figures into the folder, which is created if necessary.
 int draw_figures(const PaperFlags& flags, Console& console) {
   std::error_code failed;
   std::filesystem::create_directories(flags.figures, failed);

@@ -49,9 +49,9 @@ the picture is drawn on the terminal. --range and --at are in SI units.
 Time histories are solved again: in this process if the database is a file or the point belongs to
 no study, else by a worker of the server.)";
 
-/// Where the picture is written, and its size.
+/// Destination, format and size of the picture.
 struct PictureFlags {
-  std::string size;  ///< empty: the picture's own
+  std::string size;  ///< empty: the default size of the picture
   std::string out;
   std::string format;
   bool show = false;
@@ -59,23 +59,23 @@ struct PictureFlags {
 
 struct PlotFlags {
   plot::PlotRequest request;
-  std::optional<std::int64_t> point;  ///< of the study
-  PointFlags values;                  ///< of a point that belongs to no study
-  std::string panel;                  ///< of a point; empty: all
+  std::optional<std::int64_t> point;  ///< point of the study
+  PointFlags values;                  ///< values of a point without a study
+  std::string panel;                  ///< panel of a point; empty: all panels
   PictureFlags picture;
   PointSource source;
 };
 
-/// The picture that the flags define together.
+/// The picture that the combined flags request.
 struct PictureChoice {
   plot::PictureFormat format;
   std::optional<plot::Size> size;
-  bool is_shown;    ///< on standard output, as text
-  bool is_written;  ///< to a file or to standard output
+  bool is_shown;    ///< shown as text on standard output
+  bool is_written;  ///< written to a file or standard output
 };
 
-/// Checks the combination of flags. Throws solver::InputError, naming the flag, for a
-/// contradiction, and if no output is named and standard output is no terminal.
+/// Checks the combination of flags. Throws solver::InputError that names the flag if flags
+/// contradict each other, or if no output is named and standard output is not a terminal.
 PictureChoice picture_choice(const PictureFlags& flags) {
   const auto format = plot::picture_format(flags.format, flags.out);
   if (flags.show && flags.out.empty() && !flags.format.empty()) {
@@ -111,9 +111,9 @@ int put_out(Console& console, const PictureFlags& flags, const plot::Figure& fig
   return kDone;
 }
 
-/// Moves the rows of the fall out of the trace. Returns the finger's shape when its tip has dropped
-/// a quarter, a half and three quarters of H, interpolated between two rows; none if a worker sent
-/// no such rows.
+/// Moves the rows of the fall from the trace into `falls`: the shape of the finger after its tip
+/// has dropped a quarter, a half and three quarters of H, interpolated between two rows. Leaves
+/// `falls` empty if a worker sent no rows of the fall.
 void take_falls(plot::PointHistory& history) {
   const auto fall = take_fall(history.rows);
   for (const double share : {0.25, 0.5, 0.75}) {
@@ -234,7 +234,7 @@ CLI::Option* add_text(CLI::App& command, const std::string& flag, std::string& v
   return command.add_option(flag, value, help)->type_name(type);
 }
 
-/// Throws InputError for flags that have no effect on this kind of picture.
+/// Throws InputError if flags are given that have no effect on this kind of picture.
 void exclude(CLI::Option* option, const std::vector<CLI::Option*>& others) {
   for (auto* other : others) {
     if (other != option) {

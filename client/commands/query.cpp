@@ -67,7 +67,7 @@ int query(const QueryFlags& flags, Console& console) {
     }
     return kDone;
   } catch (const solver::InputError&) {
-    // Throws std::runtime_error (exit code 1) if the study does not exist, instead of wrong usage.
+    // Throws std::runtime_error (exit code 1) for an unknown study; the query would exit with 2.
     (void)study_named(*source, flags.query.study);
     throw;
   }

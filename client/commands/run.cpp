@@ -29,7 +29,7 @@ int run(const RunFlags& flags, Console& console) {
   const auto study = checked_study(console, flags.study);
   refuse_used_database(flags.settings.service.database);
   note_unusual_values(console.notes(), study.recipe);
-  // before any thread starts; see StopSignals
+  // created before any thread starts; see StopSignals
   protocol::StopSignals stop;
   const auto end = run_study(console, study, flags.settings, stop);
   if (!end) {

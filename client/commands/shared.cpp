@@ -30,13 +30,13 @@ bool is_database(const fs::path& file) {
   constexpr std::string_view kMagic = "SQLite format 3";
   std::array<char, kMagic.size()> begin{};
   std::error_code error;
-  if (fs::is_regular_file(file, error)) {  // opening a pipe would wait
+  if (fs::is_regular_file(file, error)) {  // a pipe would block when opened
     std::ifstream(file, std::ios::binary).read(begin.data(), begin.size());
   }
   return std::string_view(begin.data(), begin.size()) == kMagic;
 }
 
-/// The command line of a process as words; empty if it cannot be read.
+/// Returns the command line of a process as words; empty if it cannot be read.
 std::vector<std::string> words_of_process(const std::string& pid) {
   std::ifstream file("/proc/" + pid + "/cmdline");
   std::vector<std::string> words;
@@ -46,9 +46,9 @@ std::vector<std::string> words_of_process(const std::string& pid) {
   return words;
 }
 
-/// The oblique-server that has the file open, or the `oblique` that started it, such as "`oblique
-/// view` (process 4711)"; "another server" if the process cannot be found, for example because
-/// another user runs it.
+/// Describes the process that has the database open: the oblique-server, or the `oblique` that
+/// started it, as "`oblique view` (process 4711)". Returns "another server" if it cannot find the
+/// process, for example because another user runs it.
 std::string user_of(const fs::path& database) try {
   for (const auto& process : fs::directory_iterator("/proc")) {
     const std::string pid = process.path().filename().string();
@@ -70,7 +70,7 @@ std::string user_of(const fs::path& database) try {
                : fmt::format("`oblique {}` (process {})", parent[1], flag[1]);
   }
   return "another server";
-} catch (const fs::filesystem_error&) {  // the process has ended meanwhile
+} catch (const fs::filesystem_error&) {  // the process has ended
   return "another server";
 }
 
@@ -150,7 +150,8 @@ Format format_of(const OutputFlags& flags) {
 std::uint64_t print_stream(Console& console, RowStream& stream, const OutputFlags& flags,
                            bool in_shown_units, const std::string& way_to_all) {
   const Format format = format_of(flags);
-  // The output file is not opened before the first part of the answer has arrived.
+  // Waits for the first part of the answer before opening the output file, so that a failed query
+  // opens no file.
   protocol::QueryReply chunk = stream.next();
   RowOutput out({.format = format,
                  .file = flags.file,

@@ -29,13 +29,13 @@ constexpr const char* kStandardOutput = "-";
 struct SolveFlags {
   PointFlags points;
   bool json = false;
-  std::optional<std::string> trace;  // file; "-" is standard output
+  std::optional<std::string> trace;  // file for the time histories; "-": standard output
   bool trace_shape = false;
   bool errors = false;
 };
 
-/// Opens the output for the trace. Throws InputError if `where` cannot be written, or if it is
-/// standard output and `json` is set.
+/// Opens the output for the trace. Throws InputError if `where` cannot be written, or if `where` is
+/// standard output although `json` is set.
 TraceOutput trace_output(const std::string& where, bool json) {
   if (where == kStandardOutput && json) {
     throw solver::InputError(
@@ -44,7 +44,8 @@ TraceOutput trace_output(const std::string& where, bool json) {
   return {where == kStandardOutput ? "" : where, Format::kCsv, "--trace"};
 }
 
-/// Checked before the values, because an error about a value names the largest of a list.
+/// Rejects lists. This check precedes that of the values, whose error would name only the largest
+/// value of a list.
 void check_one_value_each(const PointFlags& flags) {
   for (const auto& [key, text] : flags.axes) {
     const bool is_list = text.find(',') != std::string::npos && text.find('(') == std::string::npos;

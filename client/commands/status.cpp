@@ -47,7 +47,7 @@ struct StatusFlags {
   SourceFlags source;
 };
 
-/// Pads the headings and cells of these text columns on the right to one width.
+/// Right-aligns these text columns: pads their headings and cells to one width.
 void align_right(protocol::Table& rows, const std::vector<std::string>& columns) {
   for (std::size_t column = 0; column < rows.columns.size(); ++column) {
     std::string& heading = rows.columns[column];
@@ -66,14 +66,14 @@ void align_right(protocol::Table& rows, const std::vector<std::string>& columns)
   }
 }
 
-/// Rounded down: an unfinished study never shows 100 %.
+/// Percentage of completed points, rounded down so that an unfinished study never shows 100 %.
 int percent_done(const StudyStatus& study) {
   const auto done = static_cast<double>(protocol::completed_points(study));
   return study.points() == 0 ? 100
                              : static_cast<int>(100.0 * done / static_cast<double>(study.points()));
 }
 
-/// Columns that fit 80 characters.
+/// Returns the columns that fit into 80 characters.
 protocol::Table table_for_people(const std::vector<StudyStatus>& studies) {
   constexpr std::size_t kNameBytes = 18;
   const auto any = [&studies](auto&& is_so) {
@@ -95,7 +95,7 @@ protocol::Table table_for_people(const std::vector<StudyStatus>& studies) {
   add_column(true, "prio");
   add_column(any_version, "solver");
   for (const auto& study : studies) {
-    // A single study has room for its whole name.
+    // The table of a single study has room for its whole name.
     auto& row = table.rows.emplace_back(protocol::Row{
         studies.size() == 1 ? study.name() : protocol::shortened(study.name(), kNameBytes),
         study.state(), format_count(study.points()), fmt::format("{} %", percent_done(study))});
@@ -115,7 +115,7 @@ protocol::Table table_for_people(const std::vector<StudyStatus>& studies) {
   return table;
 }
 
-/// All columns, for programs.
+/// Returns all columns, for programs.
 protocol::Table full_table(const std::vector<StudyStatus>& studies, const std::string& access) {
   auto table = table_of(studies);
   table.columns.insert(table.columns.end(), {"submitted_by", "access", "solver_version"});
@@ -170,7 +170,7 @@ int watch(const StatusFlags& flags, Console& console) {
   FollowedStudy followed(*source, flags.study);
   bool answered = false;
   const auto ask = [&](const Tell& tell) {
-    // The first request does not wait for ever, because the address may be wrong.
+    // The first request has a timeout, because the address may be wrong.
     auto status = followed.status(answered ? tell : Tell());
     if (!std::exchange(answered, true)) {
       warn_if_insecure(console, source->access(), source->place());
@@ -183,7 +183,7 @@ int watch(const StatusFlags& flags, Console& console) {
       return print_end(console, status, [&](const std::string& sql) { return source->query(sql); });
     }
   } catch (const Interrupted&) {
-    // The caller reports it.
+    // The end of the watch is reported below.
   }
   console.notes() << "Watching ended; the study continues.\n";
   return stop.exit_code();

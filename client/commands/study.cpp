@@ -47,7 +47,7 @@ struct CheckFlags {
   bool no_rate = false;
 };
 
-/// A point with its values on the axes of its block, in their order.
+/// A point with its values on the axes of its block, in the order of the axes.
 struct ShownPoint {
   std::uint64_t number;
   std::vector<std::pair<std::string, double>> values;
@@ -69,7 +69,8 @@ struct Report {
   std::optional<StudyCost> cost;
 };
 
-/// Values come from the axes, not from the model: with axes length and length1, both have a value.
+/// Returns a point with its values. They come from the axes, not from the model, in which `length`
+/// and `length1` would not both have a value.
 ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block& block,
                        std::uint64_t number) {
   ShownPoint shown{number, {}};
@@ -80,7 +81,7 @@ ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block&
   return shown;
 }
 
-/// "H (4) x mu (40) x e": the axes with their numbers of values, and the derived keys.
+/// Describes a block as "H (4) x mu (40) x e": axes, their numbers of values, and derived keys.
 std::string made_of(const protocol::Block& block) {
   const std::string_view between = block.zip() || block.has_sample() ? ", " : " x ";
   std::string axes;
@@ -99,8 +100,8 @@ std::string made_of(const protocol::Block& block) {
   return kind + axes + following;
 }
 
-/// The last point of the block that the filter keeps; the last point if the filter keeps none of
-/// the last `most`.
+/// Returns the last point of the block that the filter keeps. Searches only the last `most` points;
+/// if the filter keeps none of them, returns the last point.
 std::uint64_t last_left_in(const protocol::PointTable& table, const protocol::BlockPlace& place,
                            std::uint64_t most) {
   const std::uint64_t last = place.first_point + place.points - 1;

@@ -94,7 +94,7 @@ int rename(const ChangeFlags& flags, Console& console) {
   return kDone;
 }
 
-/// Asks at the terminal; returns whether the answer is yes.
+/// Prompts at the terminal; returns whether the user agrees.
 bool is_confirmed(Console& console, const protocol::StudyStatus& study, const std::string& place) {
   console.errors() << fmt::format(
       "Delete {}, {}, with {} points, {} of them with results, from {}? [y/N] ",

@@ -29,8 +29,7 @@ using Clock = std::chrono::steady_clock;
 using solver::FingerPoint;
 using solver::ModelParameters;
 
-/// Calls `work` with each number below `count`, each on a thread of its own. Returns the sum of the
-/// times that the calls took [s].
+/// Calls `work` with each number below `count` on its own thread. Returns the total time [s].
 double thread_seconds(std::size_t count, const std::function<void(std::size_t)>& work) {
   std::vector<double> each_s(count);
   solver::parallel_for(count, count, [&](std::size_t i) {
@@ -41,7 +40,8 @@ double thread_seconds(std::size_t count, const std::function<void(std::size_t)>&
   return std::accumulate(each_s.begin(), each_s.end(), 0.0);
 }
 
-/// The points after each example. They share falls with it, where falls are solved together.
+/// Returns each example and the points that follow it. Points that share falls with the example are
+/// among them, so they can be solved together as in a real study.
 std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::PointTable& table,
                                      const protocol::StudySize& size) {
   constexpr std::uint64_t kNeighbours = 8;
@@ -60,7 +60,7 @@ std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::P
   return points;
 }
 
-/// Axes on which falls depend.
+/// Axes that change the fall.
 struct FallAxes {
   std::set<std::string> drawn;  ///< keys with a distribution
   double other_values = 1.0;    ///< product of the numbers of values of the other keys
@@ -95,7 +95,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
   StudyCost cost;
   cost.threads = std::max(1U, std::thread::hardware_concurrency());
   std::set<std::uint64_t> different;
-  std::vector<ModelParameters> models;  // one for each fall
+  std::vector<ModelParameters> models;  // one for each different fall
   for (const std::uint64_t example : size.examples) {
     const ModelParameters model = table.model(table.point(example).model);
     const bool in_lanes = solver::fall_side_by_side(model, model);
@@ -124,8 +124,8 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
   const std::vector<FingerPoint> points = points_over(falls, table, size);
   std::vector<std::size_t> begun(cost.threads);
   const double contacts_s = thread_seconds(cost.threads, [&](std::size_t thread) {
-    constexpr std::chrono::milliseconds kBatch{100};  // as workers' batches; at least one point per
-                                                      // lane
+    // Time for a batch, as in a worker. A batch has at least one point per lane.
+    constexpr std::chrono::milliseconds kBatch{100};
     std::size_t& i = begun[thread];
     for (const auto start = Clock::now();
          i < points.size() && Clock::now() < start + std::chrono::seconds(1);) {
@@ -146,7 +146,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
     }
   });
   cost.timed_points = std::accumulate(begun.begin(), begun.end(), std::size_t{0});
-  constexpr double kStored_s = 15e-6;  // processor time of messages and storing
+  constexpr double kStored_s = 15e-6;  // processor time for messages and storage
   cost.contact_s =
       contacts_s / static_cast<double>(std::max<std::size_t>(cost.timed_points, 1)) + kStored_s;
   return cost;

@@ -38,7 +38,7 @@ struct SubmitFlags {
   StudyFlags study;
   SourceFlags source;
   bool watch = false;
-  std::optional<std::int64_t> limit;  ///< rows of the table shown at the end; implies --watch
+  std::optional<std::int64_t> limit;  ///< rows of the table at the end; implies --watch
   SubmitSettings settings;
 };
 

@@ -36,10 +36,10 @@ Links to the page stay valid only with the same --port.)";
 struct ViewFlags {
   RunSettings settings;
   int port = 0;
-  std::string server;  // --server is refused with the remedy
+  std::string server;  // value of --server, which is refused with the remedy
 };
 
-/// Waits for a signal. Throws ProcessError when the server or the workers end.
+/// Waits for a signal. Throws ProcessError if the server or the workers end.
 void wait_for_the_end(Console& console, EmbeddedService& service, protocol::StopSignals& stop) {
   constexpr std::chrono::milliseconds kLook{500};
   while (!stop.wait(kLook)) {
@@ -50,7 +50,8 @@ void wait_for_the_end(Console& console, EmbeddedService& service, protocol::Stop
   }
 }
 
-/// Whether the server ended because the port is in use; its message names a flag of its own.
+/// Whether the server ended because the port is in use. The caller then replaces the server's
+/// message, which names a flag of the server.
 bool is_taken(int port, const ProcessError& error) {
   const auto taken = std::generic_category().message(EADDRINUSE);
   return port != 0 && std::string_view(error.what()).find(taken) != std::string_view::npos;
@@ -77,11 +78,12 @@ int view(const ViewFlags& flags, Console& console) {
   }
   refuse_used_database(how.database);
   how.http = fmt::format("127.0.0.1:{}", flags.port);
-  // before any thread starts; see StopSignals
+  // created before any thread starts; see StopSignals
   protocol::StopSignals stop;
   try {
     EmbeddedService service(how, stop);
-    // This address lets anyone change studies, so it is printed as data and not logged.
+    // With this address anyone can change studies. It is therefore printed as data, not as a note,
+    // which may be logged.
     console.out() << service.page_url() << std::endl;
     console.note("Open this address in a browser; Ctrl-C ends it.");
     wait_for_the_end(console, service, stop);

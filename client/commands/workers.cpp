@@ -29,7 +29,8 @@ struct WorkersFlags {
   SourceFlags source;
 };
 
-/// The cause of a refusal in words. A peer without a key uses another mechanism.
+/// Returns the cause of a refusal in words. "other mechanism" means that the peer has no key, or
+/// that only the peer has a key.
 std::string shown_cause(const protocol::WorkersReply& reply, const std::string& reason) {
   const bool is_mechanism = reason == "other mechanism";
   return !is_mechanism              ? reason
@@ -37,7 +38,7 @@ std::string shown_cause(const protocol::WorkersReply& reply, const std::string& 
                                     : "with a key, but the server has none";
 }
 
-/// Prints how many peers were refused, and how many frames were malformed.
+/// Prints the numbers of refused peers and of malformed frames.
 void note_access(Console& console, const protocol::WorkersReply& reply) {
   std::string refusals;
   for (const auto& of_cause : reply.refusals()) {
@@ -60,7 +61,7 @@ std::string standing_of(const protocol::WorkerStatus& worker) {
   return worker.set_aside() ? "set aside" : worker.proven() ? "proven" : "new";
 }
 
-/// All columns, for programs.
+/// Returns all columns, for programs.
 protocol::Table full_table(const protocol::WorkersReply& reply) {
   protocol::Table table{.columns = {"worker", "name", "threads", "instruction_set",
                                     "solver_version", "leased_points", "solved_points", "silent_ms",
@@ -76,7 +77,7 @@ protocol::Table full_table(const protocol::WorkersReply& reply) {
   return table;
 }
 
-/// The main columns, in 100 characters. The host is left out if the worker's name begins with it.
+/// Returns the main columns, in at most 100 characters. Omits a host that begins the worker's name.
 protocol::Table table_for_people(const protocol::WorkersReply& reply) {
   constexpr double kMillisecondsASecond = 1000.0;
   const bool has_keys = std::any_of(reply.workers().begin(), reply.workers().end(),

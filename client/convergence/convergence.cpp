@@ -30,7 +30,7 @@ constexpr double kRoundingFraction = 1e-9;
 Extrapolation monotone(double last, double before, double value, double highest_order) {
   const double order = std::log2(before / last);
   const double believed = std::min(order, highest_order);
-  // |last|, or the smaller value that theory predicts.
+  // The last difference, or the difference that theory predicts if that is larger.
   const double difference =
       std::copysign(std::max(std::abs(last), std::abs(before) * std::exp2(-highest_order)), last);
   const double correction = difference / (std::exp2(believed) - 1.0);
@@ -40,7 +40,8 @@ Extrapolation monotone(double last, double before, double value, double highest_
           .error = std::abs(correction)};
 }
 
-// Forces at the turns: peak, valley, peak, ..., peak.
+// Returns the times of the turns between compression and restitution, which are those of the force
+// extrema: peak, valley, peak, ..., peak.
 std::vector<double> turn_times(const CaseResult& result) {
   std::vector<double> times;
   for (std::size_t i = 0; i + 1 < result.phases.size(); ++i) {
@@ -49,8 +50,8 @@ std::vector<double> turn_times(const CaseResult& result) {
   return times;
 }
 
-// Start and end of each stick in turn. Touch and separation count as ends if P sticks then, so the
-// number of times is even.
+// Returns start and end of each stick in turn. Touch and separation count as ends if P sticks then,
+// so the number of times is even.
 std::vector<double> stick_times(const CaseResult& result) {
   std::vector<double> times;
   for (const auto& stick : result.stick_intervals) {
@@ -68,8 +69,9 @@ void add_lone(std::vector<ContactChange>& changes, const std::vector<double>& co
   }
 }
 
-// The states of `mode` ("sC sR sC sR") up to peak number `peak`, from 0: up to the first
-// restitution after it, or to the last one before compression starts again.
+// Returns the states of `mode` ("sC sR sC sR") up to peak number `peak`, counted from 0. They end
+// with the first restitution after the peak, or with the last state before compression starts
+// again.
 std::string mode_to_peak(const std::string& mode, std::size_t peak, bool whole_restitution) {
   std::size_t restitutions = 0;
   bool in_restitution = false;
@@ -98,7 +100,7 @@ OutputConvergence output_convergence(const Output& finest,
     });
     output.values.push_back(same == level.end() ? std::nullopt : std::optional(same->value));
   }
-  // The values of the finest levels that have the output, without a gap.
+  // Values of the finest levels that have the output, without a gap.
   std::vector<double> tail;
   for (auto value = output.values.rbegin(); value != output.values.rend() && *value; ++value) {
     tail.insert(tail.begin(), **value);
@@ -139,8 +141,7 @@ Extrapolation extrapolate(std::span<const double> values, double highest_order, 
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter) {
   const std::size_t columns = shorter.size() + 1;
-  // cost[i * columns + j]: least cost of the first i of `longer` matched with the first j of
-  // `shorter`.
+  // cost[i * columns + j]: minimum cost of matching the first i of `longer` to j of `shorter`.
   constexpr double kNever = std::numeric_limits<double>::infinity();
   std::vector<double> cost((longer.size() + 1) * columns, kNever);
   cost[0] = 0.0;
@@ -273,7 +274,7 @@ std::optional<double> relative_error(const std::optional<double>& value, double 
 
 namespace {
 
-/// Whether the tolerance controls the fall's steps, so that the fall has no step to halve.
+/// Whether the tolerance controls the steps of the fall. Such a fall has no fixed step to halve.
 bool falls_by_accuracy(const solver::ModelParameters& model) {
   return model.integrator == solver::Integrator::kExplicit && model.dt_fall_s == 0.0;
 }
@@ -311,7 +312,7 @@ std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarses
     }
     levels.push_back(std::move(level));
   }
-  constexpr std::size_t kFewest = 3;  // the order needs three levels
+  constexpr std::size_t kFewest = 3;  // minimum number of levels to find the order
   if (levels.size() < kFewest || n != 2 * finest) {
     throw solver::InputError(fmt::format(
         "--finest {} is not allowed: it must be 4, 8, 16, ... times the {} elements a link of "
@@ -338,7 +339,7 @@ std::vector<Level> step_levels(const solver::ModelParameters& model, double e_st
 
 std::optional<Level> exact_fall_level(const Level& level) {
   constexpr double kPart = 0.1;
-  constexpr double kTightest = 1e-9;  // the largest mesh of a model
+  constexpr double kTightest = 1e-9;  // smallest tolerance of a model
   if (!falls_by_accuracy(level.model)) {
     return std::nullopt;
   }

@@ -19,8 +19,8 @@ using solver::readable_number;
 
 constexpr double kMicroseconds = 1e6;
 constexpr double kPercent = 100.0;
-/// Outputs whose last difference is below this part of their scale count as settled, because a fine
-/// mesh has fast vibrations of about this size.
+/// Outputs whose last difference is below this part of their scale count as settled: on a fine
+/// mesh, fast vibrations are about this large.
 constexpr double kSettled = 1e-3;
 
 bool is_settled(const OutputConvergence& output) {
@@ -31,7 +31,7 @@ bool is_settled(const OutputConvergence& output) {
   return extrapolation.trend != Trend::kTooFew;
 }
 
-/// A trend in JSON and as a remark in the table.
+/// Name of a trend in JSON, and its remark in the table.
 struct TrendNames {
   const char* name;
   const char* remark;
@@ -53,7 +53,7 @@ std::optional<double> times(const std::optional<double>& value, double factor) {
   return value ? std::optional(*value * factor) : std::nullopt;
 }
 
-// An estimate has two digits.
+// Adds an estimate with two digits.
 void add_rough(protocol::Row& row, const std::optional<double>& value) {
   row.emplace_back(value ? readable_number(*value, 2) : std::string("-"));
 }
@@ -96,7 +96,7 @@ std::string change_sentence(const Refinement& refinement, const ContactChange& c
                      change.in_finer ? coarser : finer);
 }
 
-// The largest relative error.
+// The largest relative error and the output that has it.
 struct Worst {
   void add(const std::string& name, const std::optional<double>& error) {
     if (error && *error > largest) {
@@ -168,7 +168,7 @@ double fall_tolerance(const Refinement& step) {
 
 using FallChanges = std::vector<std::pair<std::string, std::optional<double>>>;
 
-// Relative changes of the outputs; nothing if the modes differ.
+// Returns the relative changes of the outputs; nothing if the modes differ.
 std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {
   const auto& exact = exact_fall.result;
   if (step.levels.front().result.major_mode != exact.major_mode) {
@@ -186,7 +186,7 @@ std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedL
 }  // namespace
 
 Refinement refinement_of(std::string what, std::vector<SolvedLevel> levels) {
-  constexpr double kHighOrder = 4.0;  // of PEFRL and the cubic elements
+  constexpr double kHighOrder = 4.0;  // order of PEFRL and the cubic elements
   constexpr double kLowOrder = 2.0;   // of generalized-alpha
   const bool is_low = what == "step" && levels.front().level.model.integrator ==
                                             solver::Integrator::kGeneralizedAlpha;

@@ -1,9 +1,10 @@
 #include "client/explore/answer.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <optional>
+#include <filesystem>
 #include <ostream>
 #include <string_view>
 #include <utility>
@@ -15,19 +16,14 @@
 #include "client/io/row_output.h"
 #include "client/plot/picture_file.h"
 #include "proto/program/usage.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
 
 constexpr std::array<std::string_view, 3> kTextFormats{"table", "csv", "json"};
-
-/// The format of a file with numbers; none for pictures.
-std::optional<Format> numbers_format(const std::string& file) {
-  return file.ends_with(".csv")    ? std::optional(Format::kCsv)
-         : file.ends_with(".json") ? std::optional(Format::kJson)
-                                   : std::nullopt;
-}
+constexpr std::array<std::string_view, 6> kEndings{".svg", ".pdf", ".png", ".gp", ".csv", ".json"};
 
 std::string text_in_format(const Answer& answer, Format format) {
   return format == Format::kTable  ? answer.tables
@@ -43,19 +39,19 @@ std::string interval_text(const protocol::Value& from, const protocol::Value& to
   return from.index() == 0 && to.index() == 0 ? "" : fmt::format("{} to {}", text(from), text(to));
 }
 
-protocol::Table with_intervals(const protocol::Table& rows) {
-  protocol::Table shown;
-  shown.rows.resize(rows.rows.size());
-  for (std::size_t i = 0; i < rows.columns.size(); ++i) {
-    const bool is_interval = rows.columns[i].ends_with("_from");
-    shown.columns.push_back(is_interval ? "95 %" : rows.columns[i]);
-    for (std::size_t row = 0; row < rows.rows.size(); ++row) {
-      const auto& cells = rows.rows[row];
-      shown.rows[row].push_back(is_interval ? interval_text(cells[i], cells[i + 1]) : cells[i]);
+/// Makes one column of NAME_from and NAME_to.
+protocol::Table with_intervals(protocol::Table table) {
+  for (std::size_t i = 0; i < table.columns.size(); ++i) {
+    if (table.columns[i].ends_with("_from")) {
+      table.columns[i] = "95 %";
+      table.columns.erase(table.columns.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      for (protocol::Row& row : table.rows) {
+        row[i] = interval_text(row[i], row[i + 1]);
+        row.erase(row.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+      }
     }
-    i += is_interval ? 1 : 0;
   }
-  return shown;
+  return table;
 }
 
 }  // namespace
@@ -74,14 +70,12 @@ void add_answer_flags(CLI::App& command, AnswerFlags& flags) {
 
 void check(const AnswerFlags& flags) {
   static_cast<void>(format_named(flags.format, kTextFormats));
-  const auto pictures = plot::picture_format_names();
   const auto ending = std::filesystem::path(flags.file).extension().string();
-  if (!flags.file.empty() && !numbers_format(flags.file) &&
-      std::find(pictures.begin(), pictures.end(), ending.substr(ending.empty() ? 0 : 1)) ==
-          pictures.end()) {
-    throw solver::InputError(fmt::format(
-        "--out {}: the ending is not a format: it must be one of .svg, .pdf, .png, .gp, .csv, .json",
-        flags.file));
+  if (!flags.file.empty() &&
+      std::find(kEndings.begin(), kEndings.end(), ending) == kEndings.end()) {
+    throw solver::InputError(
+        fmt::format("--out {}: the ending is not a format: it must be one of {}", flags.file,
+                    fmt::join(kEndings, ", ")));
   }
 }
 
@@ -97,17 +91,14 @@ Answer answer_of(nlohmann::ordered_json facts, protocol::Table rows, plot::Figur
 
 void put_out(Console& console, const AnswerFlags& flags, const Answer& answer) {
   console.out() << text_in_format(answer, format_named(flags.format, kTextFormats));
-  if (flags.file.empty()) {
-    return;
-  }
-  if (const auto format = numbers_format(flags.file)) {
+  if (!flags.file.empty()) {
     AtomicFile file(flags.file);
-    file.append(text_in_format(answer, *format));
+    file.append(flags.file.ends_with(".csv") ? text_in_format(answer, Format::kCsv)
+                : flags.file.ends_with(".json")
+                    ? text_in_format(answer, Format::kJson)
+                    : plot::picture_of(answer.figure, plot::picture_format({}, flags.file)));
     file.finish();
-    return;
   }
-  const auto format = plot::picture_format({}, flags.file);
-  plot::write_picture(plot::picture_of(answer.figure, format), format, flags.file);
 }
 
 protocol::Value value_of(double number) {

@@ -3,17 +3,18 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
-#include <Eigen/Dense>
-#include <unsupported/Eigen/LevenbergMarquardt>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
 #include "client/io/console.h"
+#include "proto/recipe/sampling.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -40,6 +41,11 @@ Index index_of(std::size_t number) {
   return static_cast<Index>(number);
 }
 
+/// The inverse of share = (1 + cos w) / 2.
+double angle_at(double share) {
+  return 2.0 * pi - std::acos(std::clamp(2.0 * share - 1.0, -1.0, 1.0));
+}
+
 }  // namespace
 
 double Unknown::value_at(double angle) const {
@@ -49,9 +55,16 @@ double Unknown::value_at(double angle) const {
 }
 
 double Unknown::angle_of(double value) const {
-  const double share =
-      from > 0.0 ? std::log(value / from) / std::log(to / from) : (value - from) / (to - from);
-  return 2.0 * pi - std::acos(std::clamp(2.0 * share - 1.0, -1.0, 1.0));
+  return angle_at(from > 0.0 ? std::log(value / from) / std::log(to / from)
+                             : (value - from) / (to - from));
+}
+
+VectorXd FitProblem::start() const {
+  VectorXd angles(index_of(unknowns.size()));
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    angles[index_of(i)] = unknowns[i].angle_of(unknowns[i].start);
+  }
+  return angles;
 }
 
 void FitProblem::check() const {
@@ -75,21 +88,27 @@ void FitProblem::check() const {
 
 namespace {
 
+VectorXd parameters_at(const FitProblem& problem, const VectorXd& angles) {
+  VectorXd values(angles.size());
+  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
+    values[index_of(i)] = problem.unknowns[i].value_at(angles[index_of(i)]);
+  }
+  return values;
+}
+
 /// The model with derivatives at several vectors of angles, by one call of `evaluate`.
-std::vector<FitStep> steps_at(const FitProblem& problem, const std::vector<VectorXd>& places,
+std::vector<FitStep> steps_at(const FitProblem& problem, std::vector<VectorXd> places,
                               const std::string& what) {
-  const Index unknowns = index_of(problem.unknowns.size());
   std::vector<VectorXd> points;
-  for (const VectorXd& angles : places) {
-    for (Index i = 0; i < 2 * unknowns + 1; ++i) {
-      VectorXd values = angles;
-      if (i > 0) {
-        values[(i - 1) / 2] += i % 2 == 1 ? -kDifference : kDifference;
-      }
-      for (std::size_t u = 0; u < problem.unknowns.size(); ++u) {
-        values[index_of(u)] = problem.unknowns[u].value_at(values[index_of(u)]);
-      }
-      points.push_back(std::move(values));
+  for (VectorXd& angles : places) {
+    // Mirrors an angle beyond a bound, which has the same cosine.
+    angles = 2.0 * pi - angles.array().unaryExpr(
+                            [](double w) { return std::abs(std::remainder(w, 2.0 * pi)); });
+    points.push_back(parameters_at(problem, angles));
+    for (Index i = 0; i < angles.size(); ++i) {
+      const VectorXd change = kDifference * VectorXd::Unit(angles.size(), i);
+      points.push_back(parameters_at(problem, angles - change));
+      points.push_back(parameters_at(problem, angles + change));
     }
   }
   const auto predictions = problem.evaluate(points, what);
@@ -98,119 +117,103 @@ std::vector<FitStep> steps_at(const FitProblem& problem, const std::vector<Vecto
     FitStep& step = steps.emplace_back();
     step.angles = places[p];
     step.parameters = points[at];
-    step.predictions = predictions[at++];
-    step.is_complete = step.predictions.allFinite();
+    step.predictions = predictions.at(at++);
     step.residuals = ((step.predictions - problem.measured).array() / problem.sd.array())
                          .unaryExpr([](double r) { return std::isfinite(r) ? r : kMissing; });
     step.chi2 = step.residuals.squaredNorm();
-    step.jacobian.resize(problem.measured.size(), unknowns);
-    for (Index i = 0; i < unknowns; ++i, at += 2) {
-      step.jacobian.col(i) =
-          ((predictions[at + 1] - predictions[at]).array() / problem.sd.array() / kDifference / 2.0)
-              .unaryExpr([](double slope) { return std::isfinite(slope) ? slope : 0.0; });
+    step.jacobian.resize(step.residuals.size(), step.angles.size());
+    for (Index i = 0; i < step.angles.size(); ++i, at += 2) {
+      step.jacobian.col(i) = ((predictions.at(at + 1) - predictions[at]).array() /
+                              problem.sd.array() / (2.0 * kDifference))
+                                 .unaryExpr([](double s) { return std::isfinite(s) ? s : 0.0; });
     }
   }
   return steps;
 }
 
-/// Gauss and Newton's step (J^T J + 1e-3) delta = -J^T r. The damping keeps combinations without
-/// effect where they are.
-VectorXd newton_step(const MatrixXd& jacobian, const VectorXd& residuals) {
+/// Levenberg and Marquardt's step (J^T J + damping) delta = -J^T r, with the least damping from
+/// 1e-3 for which the length of delta is at most `radius`. The damping of 1e-3 keeps combinations
+/// of unknowns without effect where they are.
+VectorXd damped_step(const MatrixXd& jacobian, const VectorXd& residuals,
+                     double radius = HUGE_VAL) {
   MatrixXd normal = jacobian.transpose() * jacobian;
   normal.diagonal().array() += 1e-3;
-  return normal.ldlt().solve(-jacobian.transpose() * residuals);
+  for (double damping = 1e-3;; damping *= 2.0) {
+    VectorXd delta = normal.ldlt().solve(-jacobian.transpose() * residuals);
+    if (!(delta.norm() > radius)) {
+      return delta;
+    }
+    normal.diagonal().array() += damping;
+  }
 }
 
-/// By how much the linearised model lets chi2 fall.
-double predicted_fall(const MatrixXd& jacobian, const VectorXd& residuals, const VectorXd& step) {
-  return residuals.squaredNorm() - (residuals + jacobian * step).squaredNorm();
+/// The place with the least chi2 among the start and Sobol's first points.
+VectorXd best_start(const FitProblem& problem) {
+  constexpr std::uint64_t kPlaces = 16;
+  std::vector<VectorXd> places(kPlaces, problem.start());
+  for (std::uint64_t p = 1; p < kPlaces; ++p) {
+    for (Index i = 0; i < places[p].size(); ++i) {
+      const auto bits = sampling::sobol_bits(p, static_cast<std::uint32_t>(i));
+      places[p][i] = angle_at(std::ldexp(static_cast<double>(bits), -sampling::kSobolBits));
+    }
+  }
+  return std::ranges::min(steps_at(problem, places, "starts"), {}, &FitStep::chi2).angles;
 }
-
-/// The problem in Eigen's form. Eigen requests derivatives only where it requested residuals last.
-struct Residuals : public Eigen::DenseFunctor<double> {
-  explicit Residuals(const FitProblem& fitted)
-      : Eigen::DenseFunctor<double>(static_cast<int>(fitted.unknowns.size()),
-                                    static_cast<int>(fitted.measured.size())),
-        problem(fitted) {}
-
-  int operator()(const VectorXd& angles, VectorXd& residuals) {
-    last = steps_at(problem, {angles}, what).front();
-    residuals = last.residuals;
-    return 0;
-  }
-  int df(const VectorXd& /*angles*/, MatrixXd& jacobian) const {
-    jacobian = last.jacobian;
-    return 0;
-  }
-
-  const FitProblem& problem;
-  std::string what{"start"};
-  FitStep last;
-};
 
 }  // namespace
 
-FitStep minimise(const FitProblem& problem, double tolerance,
-                 const std::function<void(const FitStep&)>& after_each) {
-  namespace Space = Eigen::LevenbergMarquardtSpace;
+FitStep minimise(const FitProblem& problem, const VectorXd& start, double tolerance) {
   constexpr int kMaxTrials = 200;
-  problem.check();
-  VectorXd angles(index_of(problem.unknowns.size()));
-  for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
-    angles[index_of(i)] = problem.unknowns[i].angle_of(problem.unknowns[i].start);
-  }
-  Residuals residuals(problem);
-  Eigen::LevenbergMarquardt<Residuals> method(residuals);
-  method.setFactor(0.1);  // the first step is at most this part of the vector of angles
-  method.setExternalScaling(true);
-  method.diag() = VectorXd::Ones(angles.size());
-  method.setXtol(1e-7);
-  method.setFtol(1e-9);
-  method.setMaxfev(kMaxTrials);
-  auto status = method.minimizeInit(angles);
-  FitStep step = residuals.last;
-  for (Index i = 0; i < step.predictions.size(); ++i) {
-    if (!std::isfinite(step.predictions[i])) {
+  constexpr double kFirstRadius = 0.5;
+  constexpr double kLeastRadius = 1e-6;
+  FitStep best = steps_at(problem, {start}, "start").front();
+  for (Index i = 0; i < best.predictions.size(); ++i) {
+    if (!std::isfinite(best.predictions[i])) {
       throw solver::SolveError(problem.names[static_cast<std::size_t>(i)] +
                                ": the model has no such output at the start; give other starts");
     }
   }
-  after_each(step);
-  while ((status == Space::NotStarted || status == Space::Running) &&
-         predicted_fall(step.jacobian, step.residuals, newton_step(step.jacobian, step.residuals)) >
-             tolerance) {
-    residuals.what = fmt::format("iteration {}, chi2 = {}", step.iteration + 1,
-                                 solver::readable_number(step.chi2, 4));
-    status = method.minimizeOneStep(angles);
-    if (residuals.last.angles == angles) {  // else the last trial was refused
-      residuals.last.iteration = step.iteration + 1;
-      step = residuals.last;
-      after_each(step);
+  double radius = kFirstRadius;
+  for (int trial = 0; trial < kMaxTrials; ++trial) {
+    const VectorXd newton = damped_step(best.jacobian, best.residuals);
+    const double fall = best.chi2 - (best.residuals + best.jacobian * newton).squaredNorm();
+    if (fall < tolerance || radius < kLeastRadius) {
+      return best;
+    }
+    const VectorXd delta = damped_step(best.jacobian, best.residuals, radius);
+    FitStep step = steps_at(problem, {best.angles + delta},
+                            fmt::format("iteration {}, chi2 = {}", best.iteration + 1,
+                                        solver::readable_number(best.chi2, 4)))
+                       .front();
+    if (step.chi2 < best.chi2) {
+      radius = std::max(radius, 2.0 * delta.norm());
+      step.iteration = best.iteration + 1;
+      best = std::move(step);
+    } else {
+      radius = delta.norm() / 4.0;
     }
   }
-  if (status == Space::TooManyFunctionEvaluation) {
-    throw solver::SolveError(fmt::format("the fit has found no minimum in {} trials", kMaxTrials));
-  }
-  return step;
+  throw solver::SolveError(fmt::format("the fit has found no minimum in {} trials", kMaxTrials));
 }
 
 namespace {
 
 /// Adds the covariance of the angles of the unknowns in `free` and what the data leave open. With
-/// the columns of J scaled to length 1, J = U S V^T D, it is D^-1 V S^-2 V^T D^-1. A small singular
-/// value is a combination that the data leave open; its unknowns are the large parts of its vector
-/// in V.
+/// the columns of J scaled to length 1 by D, (J D)^T J D = V L V^T, it is D V L^-1 V^T D. A small
+/// eigenvalue in L is a combination that the data leave open; its unknowns are the large parts of
+/// its vector in V.
 void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& free, Fit& fit) {
-  constexpr double kUndetermined = 1e-3;     // singular value, from the noise of differences
-  constexpr double kPoorlyDetermined = 0.1;  // as two unknowns with a correlation of 0.99
-  constexpr double kLeastPart = 0.2;         // of a unit vector
-  const MatrixXd columns = fit.minimum.jacobian(Eigen::all, free);
-  const VectorXd shares = columns.colwise().norm().cwiseInverse();
-  const Eigen::BDCSVD<MatrixXd> svd(columns * shares.asDiagonal(),
-                                    Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const VectorXd& values = svd.singularValues();
-  const MatrixXd root = shares.asDiagonal() * svd.matrixV() *
-                        values.cwiseMax(kUndetermined / 10.0).cwiseInverse().asDiagonal();
+  constexpr double kUndetermined = 1e-6;      // eigenvalue, from the noise of differences
+  constexpr double kPoorlyDetermined = 1e-2;  // as two unknowns with a correlation of 0.99
+  constexpr double kLeastPart = 0.2;          // of a unit vector
+  MatrixXd columns = fit.minimum.jacobian(Eigen::all, free);
+  const VectorXd scales = columns.colwise().norm().cwiseInverse();
+  columns *= scales.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(columns.transpose() * columns);
+  const VectorXd& values = eigen.eigenvalues();
+  const MatrixXd root =
+      scales.asDiagonal() * eigen.eigenvectors() *
+      values.cwiseMax(kUndetermined / 100.0).cwiseSqrt().cwiseInverse().asDiagonal();
   fit.covariance(free, free) = root * root.transpose();
   for (const std::size_t i : free) {
     const Index at = index_of(i);
@@ -220,18 +223,15 @@ void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& f
     const double slope = (value(kDifference) - value(-kDifference)) / (2.0 * kDifference);
     fit.unknowns[i].sd = slope * std::sqrt(fit.covariance(at, at) * fit.scale);
   }
-  for (Index k = 0; k < values.size(); ++k) {
-    if (values[k] >= kPoorlyDetermined) {
-      continue;
-    }
-    auto& [unknowns, is_undetermined] =
-        fit.combinations.emplace_back(Combination{{}, values[k] < kUndetermined});
+  for (Index k = 0; k < values.size() && values[k] < kPoorlyDetermined; ++k) {
+    Combination combination{.unknowns = {}, .is_undetermined = values[k] < kUndetermined};
     for (std::size_t i = 0; i < free.size(); ++i) {
-      if (std::abs(svd.matrixV()(index_of(i), k)) > kLeastPart) {
-        unknowns.push_back(free[i]);
-        fit.unknowns[free[i]].sd = is_undetermined ? kNaN : fit.unknowns[free[i]].sd;
+      if (std::abs(eigen.eigenvectors()(index_of(i), k)) > kLeastPart) {
+        combination.unknowns.push_back(free[i]);
+        fit.unknowns[free[i]].sd = combination.is_undetermined ? kNaN : fit.unknowns[free[i]].sd;
       }
     }
+    fit.combinations.push_back(std::move(combination));
   }
 }
 
@@ -264,162 +264,102 @@ Fit fit_at(const FitProblem& problem, const FitStep& minimum, bool is_scaled) {
   return fit;
 }
 
-/// Searches one end of a profile-likelihood interval, one trial at a time. The root of the rise of
-/// chi2, f(w) = sqrt((least chi2 with the angle w - chi2) / limit), is 0 at the minimum and 1 at
-/// the end, and linear where the residuals are. Trials go outwards until f > 1, then divide the
-/// bracket. Each starts from the linearised model at the last angle with f < 1; steps of Gauss and
-/// Newton in the other angles correct it.
+/// Searches one end of a profile-likelihood interval: the farthest angle of an unknown with which
+/// chi2 <= minimum + limit is possible. For a change d of this angle the linearised model has the
+/// least residuals r + g d over the other angles. A trial goes from the farthest step inside to
+/// |r + g d|^2 = minimum + limit; one outside is followed by a shorter one.
 class IntervalEnd {
  public:
   /// `side` is -1 for the lower end, 1 for the upper one.
-  IntervalEnd(const FitStep& minimum, Index unknown, double side, double limit, double variance)
-      : minimum_(minimum),
-        unknown_(unknown),
-        side_(side),
-        limit_(limit),
-        least_(minimum.angles[unknown]),
-        bound_(side < 0.0 ? pi : 2.0 * pi),
-        usual_distance_(std::min(variance > 0.0 ? std::sqrt(limit * variance) : kWithoutVariance,
-                                 std::abs(bound_ - least_))),
-        inside_(minimum),
-        is_open_(std::abs(bound_ - least_) >= kAtBound) {
-    try_at(outwards(usual_distance_ / 2.0));
+  IntervalEnd(const FitStep& minimum, Index unknown, double side, double limit)
+      : minimum_(minimum.chi2), unknown_(unknown), side_(side), limit_(limit), inside_(minimum) {
+    shortest_ = kShortest * choose_trial(minimum, reach(), 1.0);
   }
 
-  bool is_open() const { return is_open_; }
   const VectorXd& trial() const { return trial_; }
-  /// The last angle inside the interval; nothing if no angle outside was found.
-  std::optional<double> angle() const {
-    return outside_angle_ ? std::optional(inside_.angles[unknown_]) : std::nullopt;
-  }
-  bool is_cut() const { return is_cut_; }
+  bool is_open() const { return is_open_; }
+  double angle() const { return inside_.angles[unknown_]; }
+  bool is_at_bound() const { return reach() < kAtBound; }
+  /// Whether chi2 jumps over the limit here.
+  bool is_cut() const { return !is_at_bound() && rise_of(inside_) < 1.0 - kJump; }
 
+  /// Takes the model at the trial, and chooses the next one.
   void take(const FitStep& step) {
-    constexpr int kMaxCorrections = 4;
-    constexpr double kSmallFall = 2e-3;  // of the limit
-    const bool is_better = step.chi2 < best_.chi2 - kSmallFall * limit_;
-    if (step.chi2 < best_.chi2) {
-      best_ = step;
-    }
-    if (is_better && best_.is_complete && corrections_ < kMaxCorrections &&
-        correct(best_, kSmallFall * limit_)) {
-      ++corrections_;
+    const double rise = rise_of(step);
+    if (rise < 1.0 + kTolerance) {
+      inside_ = step;
+      part_ = std::min(1.0, 2.0 * part_);
+    } else if (!is_correction_ && step.predictions.allFinite() &&
+               choose_trial(step, 0.0, 1.0) > shortest_) {
+      is_correction_ = true;
       return;
+    } else {
+      const double least = rise_of(inside_);
+      part_ *= std::clamp((1.0 - least) / (rise - least), 0.25, 0.9);
     }
-    judge();
+    is_correction_ = false;
+    is_open_ = !is_at_bound() && choose_trial(inside_, reach(), part_) > shortest_;
   }
 
  private:
-  static constexpr double kWithoutVariance = 0.6;
+  static constexpr double kTolerance = 2e-3;  ///< of `rise_of`
+  static constexpr double kJump = 0.05;       ///< of `rise_of`
+  static constexpr double kShortest = 5e-4;   ///< step outwards, of the first one
 
-  double outwards(double distance) const {
-    return least_ + side_ * std::min(distance, std::abs(bound_ - least_));
+  /// 0 at the minimum, 1 at the end, and linear where the residuals are.
+  double rise_of(const FitStep& step) const {
+    return std::sqrt(std::max(step.chi2 - minimum_, 0.0) / limit_);
   }
+  /// How far the bound is.
+  double reach() const { return side_ < 0.0 ? angle() - pi : 2.0 * pi - angle(); }
 
-  /// The next trial, at angle `w` of the unknown.
-  void try_at(double w) {
-    FitStep shifted = inside_;
-    shifted.residuals += inside_.jacobian.col(unknown_) * (w - inside_.angles[unknown_]);
-    shifted.angles[unknown_] = w;
-    trial_ = shifted.angles;
-    correct(shifted, 0.0);
-    best_ = {};
-    best_.chi2 = HUGE_VAL;
-    corrections_ = 0;
-  }
-
-  /// Makes the Gauss-Newton step from `step` in the other angles the next trial. Returns false if
-  /// chi2 would fall by less than `least_fall`.
-  bool correct(const FitStep& step, double least_fall) {
+  /// Chooses the trial that is this part of the way from `base` to the end, at most `farthest`
+  /// farther outwards. Returns how far the trial is from the farthest step inside.
+  double choose_trial(const FitStep& base, double farthest, double part) {
     constexpr double kLongest = 0.5;
-    MatrixXd others = step.jacobian;
+    MatrixXd others = base.jacobian;
     others.col(unknown_).setZero();
-    VectorXd delta = newton_step(others, step.residuals);
-    if (predicted_fall(others, step.residuals, delta) < least_fall) {
-      return false;
-    }
-    delta *= std::min(1.0, kLongest / std::max(delta.norm(), kLongest));
-    trial_ = (step.angles + delta).cwiseMax(pi + kAtBound).cwiseMin(2.0 * pi - kAtBound);
-    trial_[unknown_] = step.angles[unknown_];
-    return true;
+    VectorXd step = damped_step(others, base.residuals);
+    VectorXd per_d = damped_step(others, base.jacobian.col(unknown_));
+    per_d[unknown_] = 1.0;
+    const VectorXd r = base.residuals + others * step;
+    const VectorXd g = base.jacobian * per_d;
+    const double a = std::max(g.squaredNorm(), 1e-9);
+    const double b = g.dot(r);
+    const double c = r.squaredNorm() - minimum_ - limit_;
+    const double outwards = (std::sqrt(std::max(b * b - a * c, 0.0)) - side_ * b) / a;
+    // Differences across a jump make the end seem near.
+    const double least = rise_of(inside_) < 1.0 - kJump ? 2.0 * shortest_ : 0.0;
+    const double d = side_ * std::min(std::max(outwards, least), farthest);
+    step += d * per_d;
+    step *= part * std::min(1.0, kLongest / step.norm());
+    trial_ = base.angles + step;
+    return side_ * (trial_[unknown_] - angle());
   }
 
-  double root_of_rise(double chi2) const {
-    return std::sqrt(std::max(chi2 - minimum_.chi2, 0.0) / limit_);
-  }
-
-  /// Decides on which side of the end the last angle is, and where to go on.
-  void judge() {
-    constexpr double kTolerance = 2e-3;        // of f
-    constexpr double kSmallestBracket = 5e-3;  // of the distance to the minimum, or the usual one
-    constexpr double kJump = 0.1;              // of f, within the smallest bracket
-    const double w = trial_[unknown_];
-    const double f = root_of_rise(best_.chi2);
-    if (f > 1.0) {
-      outside_angle_ = w;
-      outside_f_ = f;
-    } else {
-      inside_ = best_;
-    }
-    const bool is_end = std::abs(f - 1.0) < kTolerance;
-    if (is_end) {
-      inside_.angles[unknown_] = w;
-      outside_angle_ = w;
-    }
-    if (is_end || (f <= 1.0 && std::abs(w - bound_) < 1e-9)) {
-      is_open_ = false;
-      return;
-    }
-    if (!outside_angle_) {
-      try_at(outwards(std::clamp(1.05 / std::max(f, 1e-3), 1.1, 2.0) * std::abs(w - least_)));
-      return;
-    }
-    const double inside_f = root_of_rise(inside_.chi2);
-    const double width = *outside_angle_ - inside_.angles[unknown_];
-    if (std::abs(width) <
-        kSmallestBracket * std::max(std::abs(*outside_angle_ - least_), usual_distance_)) {
-      is_cut_ = outside_f_ - inside_f > kJump;
-      is_open_ = false;
-      return;
-    }
-    // Halves where the straight line between the ends does not halve the bracket: f has a step.
-    const bool is_slow = std::abs(width) > std::exchange(last_width_, std::abs(width)) / 2.0;
-    const double part = is_slow ? 0.5 : (1.0 - inside_f) / (outside_f_ - inside_f);
-    try_at(inside_.angles[unknown_] + std::clamp(part, 0.05, 0.95) * width);
-  }
-
-  const FitStep& minimum_;
+  double minimum_;
   Index unknown_;
   double side_;
   double limit_;
-  double least_;
-  double bound_;
-  double usual_distance_;  ///< of the end, by the covariance
-  FitStep inside_;         ///< best trial at the farthest angle with f < 1
-  std::optional<double> outside_angle_;
-  double outside_f_ = HUGE_VAL;
-  double last_width_ = HUGE_VAL;
+  FitStep inside_;
   VectorXd trial_;
-  FitStep best_;
-  int corrections_ = 0;
-  bool is_open_;
-  bool is_cut_ = false;
+  double part_ = 1.0;  ///< of the step that the linearised model gives
+  double shortest_ = 0.0;
+  bool is_correction_ = false;  ///< the trial starts from a step outside
+  bool is_open_ = !is_at_bound();
 };
 
-/// Fills in the intervals, all ends side by side. Returns the step with the least chi2 if that is
-/// below the minimum; with `ends_early` it returns it at once.
-std::optional<FitStep> add_intervals(const FitProblem& problem, bool ends_early, Fit& fit) {
+/// Fills in the intervals, all ends side by side. Returns the step with the least chi2 on the way.
+FitStep add_intervals(const FitProblem& problem, Fit& fit) {
   constexpr int kMaxRounds = 40;
-  constexpr double kSmallerChi2 = 1e-4;  // less is the same minimum
   const double limit = kChi2Quantile * fit.scale;
   std::vector<IntervalEnd> ends;
   for (Index i = 0; i < fit.covariance.rows(); ++i) {
-    ends.emplace_back(fit.minimum, i, -1.0, limit, fit.covariance(i, i));
-    ends.emplace_back(fit.minimum, i, 1.0, limit, fit.covariance(i, i));
+    ends.emplace_back(fit.minimum, i, -1.0, limit);
+    ends.emplace_back(fit.minimum, i, 1.0, limit);
   }
-  std::optional<FitStep> better;
-  double least = fit.minimum.chi2 - kSmallerChi2 - 0.01 * limit;
-  for (int round = 1; round <= kMaxRounds && !(ends_early && better); ++round) {
+  FitStep least = fit.minimum;
+  for (int round = 1; round <= kMaxRounds; ++round) {
     std::vector<IntervalEnd*> open;
     std::vector<VectorXd> places;
     for (IntervalEnd& end : ends) {
@@ -435,22 +375,20 @@ std::optional<FitStep> add_intervals(const FitProblem& problem, bool ends_early,
         problem, places, fmt::format("intervals, round {}: {} ends open", round, open.size()));
     for (std::size_t i = 0; i < open.size(); ++i) {
       open[i]->take(steps[i]);
-      if (steps[i].chi2 < least) {
-        least = steps[i].chi2;
-        better = steps[i];
-      }
+      least = steps[i].chi2 < least.chi2 ? steps[i] : least;
     }
   }
   for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
+    const IntervalEnd& lower = ends[2 * i];
+    const IntervalEnd& upper = ends[2 * i + 1];
     const auto value = [&](const IntervalEnd& end) {
-      return end.angle() ? problem.unknowns[i].value_at(*end.angle()) : kNaN;
+      return end.is_at_bound() ? kNaN : problem.unknowns[i].value_at(end.angle());
     };
-    auto& unknown = fit.unknowns[i];
-    unknown.estimate.from = value(ends[2 * i]);
-    unknown.estimate.to = value(ends[2 * i + 1]);
-    unknown.is_cut = ends[2 * i].is_cut() || ends[2 * i + 1].is_cut();
+    fit.unknowns[i].estimate.from = value(lower);
+    fit.unknowns[i].estimate.to = value(upper);
+    fit.unknowns[i].is_cut = lower.is_cut() || upper.is_cut();
   }
-  return better;
+  return least;
 }
 
 }  // namespace
@@ -460,22 +398,24 @@ double Fit::correlation(Index i, Index j) const {
   return variances > 0.0 ? covariance(i, j) / std::sqrt(variances) : 0.0;
 }
 
-Fit fit(FitProblem problem, bool is_scaled) {
+Fit fit(const FitProblem& problem, bool is_scaled) {
   constexpr int kMaxStarts = 4;
+  constexpr double kSmallerChi2 = 1e-4;  // less is the same minimum
+  problem.check();
   if (is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");
   }
-  for (int start = 1;; ++start) {
-    Fit found = fit_at(problem, minimise(problem), is_scaled);
-    const auto better = add_intervals(problem, start < kMaxStarts, found);
-    if (!better || start == kMaxStarts) {
-      found.has_other_minimum = better.has_value();
-      return found;
+  Fit found;
+  VectorXd start = best_start(problem);
+  for (int i = 0; i < kMaxStarts; ++i) {
+    found = fit_at(problem, minimise(problem, start), is_scaled);
+    const FitStep least = add_intervals(problem, found);
+    if (least.chi2 > found.minimum.chi2 - kSmallerChi2 - 0.01 * kChi2Quantile * found.scale) {
+      break;
     }
-    for (std::size_t i = 0; i < problem.unknowns.size(); ++i) {
-      problem.unknowns[i].start = better->parameters[index_of(i)];
-    }
+    start = least.angles;
   }
+  return found;
 }
 
 }  // namespace oblique::client

@@ -42,6 +42,7 @@ struct FitProblem {
   /// Throws solver::InputError for a start that is not between the bounds, no unknown, and more
   /// unknowns than measured numbers.
   void check() const;
+  Eigen::VectorXd start() const;  ///< angles
 };
 
 /// The model at one parameter vector.
@@ -53,17 +54,13 @@ struct FitStep {
   Eigen::VectorXd residuals;  ///< a missing prediction counts as 1e9
   Eigen::MatrixXd jacobian;   ///< of the residuals by the angles
   double chi2 = 0.0;
-  bool is_complete = true;  ///< no prediction is missing
 };
 
-/// Minimises chi2 by Levenberg and Marquardt's method (Eigen's, after MINPACK's lmder) in the
-/// angles, with central differences. Each iteration is one call of `evaluate`. Ends when the
-/// linearised model predicts that chi2 falls by less than `tolerance`, or without progress.
-/// `after_each` is called with the start and each iteration. Throws solver::InputError as `check`,
-/// and solver::SolveError for missing predictions at the start and after 200 trials.
-FitStep minimise(
-    const FitProblem& problem, double tolerance = 1e-6,
-    const std::function<void(const FitStep&)>& after_each = [](const FitStep&) {});
+/// Minimises chi2 by Levenberg and Marquardt's method in the angles, from `start`, with central
+/// differences. Each trial is one call of `evaluate`. Ends when the linearised model predicts that
+/// chi2 falls by less than `tolerance`, or without progress. Throws solver::SolveError for missing
+/// predictions at the start and after 200 trials.
+FitStep minimise(const FitProblem& problem, const Eigen::VectorXd& start, double tolerance = 1e-6);
 
 /// A fitted parameter; NaN for what the data do not determine.
 struct FittedUnknown {
@@ -87,17 +84,17 @@ struct Fit {
   std::size_t degrees_of_freedom = 0;
   double scale = 1.0;  ///< by which variances are multiplied
   std::vector<Combination> combinations;
-  bool has_other_minimum = false;  ///< a profile found a smaller chi2 even after three restarts
 
   double correlation(Eigen::Index i, Eigen::Index j) const;
 };
 
 /// The least chi2, the covariance (J^T J)^-1 and 95 % profile-likelihood intervals: the values of
-/// an unknown for which the least chi2 over the others is at most 3.84 scale above the minimum. All
-/// ends are searched side by side, in at most 40 calls of `evaluate`. If a profile finds a smaller
-/// chi2, the fit restarts there. With `is_scaled` the standard deviations are known up to one
-/// factor: scale is chi2 / degrees of freedom, which needs more data than unknowns; else it is 1.
-/// Throws as `minimise`.
-Fit fit(FitProblem problem, bool is_scaled = false);
+/// an unknown for which the least chi2 over the others is at most 3.84 scale above the minimum. The
+/// fit starts from the best of the starts and 15 points of Sobol's sequence, and restarts up to
+/// three times where a profile finds a smaller chi2. All ends are searched side by side, in at most
+/// 40 calls of `evaluate`. With `is_scaled` the standard deviations are known up to one factor:
+/// scale is chi2 / degrees of freedom, which needs more data than unknowns; else it is 1. Throws as
+/// `FitProblem::check` and `minimise`.
+Fit fit(const FitProblem& problem, bool is_scaled = false);
 
 }  // namespace oblique::client

@@ -94,45 +94,42 @@ solver::ModelParameters paper_start(const FitFlags& flags) {
   return start;
 }
 
-Answer paper_fit_answer(const PaperFitStep& end, const solver::ModelParameters& start) {
+Answer paper_fit_answer(const FitStep& end, const solver::ModelParameters& start) {
   const solver::ModelParameters preset = solver::preset("paper");
-  const auto& [counted_numbers, missing, rms_percent, largest_percent, largest] = end.summary;
-  nlohmann::ordered_json json = {{"elements_per_link", end.model.elements_per_link},
+  const auto missing = (end.predictions.array() == 0.0).count();
+  const double rms_percent = std::sqrt(end.residuals.array().square().mean());
+  const double largest_percent = end.residuals.cwiseAbs().maxCoeff();
+  nlohmann::ordered_json json = {{"elements_per_link", start.elements_per_link},
                                  {"iterations", end.iteration},
-                                 {"published_numbers", end.differences.size()},
+                                 {"published_numbers", end.residuals.size()},
                                  {"missing", missing},
                                  {"rms_percent", rms_percent},
                                  {"largest_percent", largest_percent}};
   protocol::Table table{
       .columns = {"parameter", "start", "fitted", "preset paper", "difference [%]"}};
-  for (const auto name : kFittedKeys) {
-    const auto& key = *solver::find_model_key(name);
-    const double value = key.get(end.model);
+  for (std::size_t i = 0; i < kFittedKeys.size(); ++i) {
+    const auto& key = *solver::find_model_key(kFittedKeys.at(i));
+    const std::string name(key.name);
+    const double value = end.parameters[static_cast<Index>(i)];
     const double percent = 100.0 * (value / key.get(preset) - 1.0);
-    auto heading = std::string(name) + (key.unit.empty() ? "" : fmt::format(" [{}]", key.unit));
-    table.rows.push_back({std::move(heading), key.get(start), value, key.get(preset),
+    table.rows.push_back({name + (key.unit.empty() ? "" : fmt::format(" [{}]", key.unit)),
+                          key.get(start), value, key.get(preset),
                           solver::signed_number(percent, 2)});
-    json["fitted"][std::string(name)] = value;
-    json["from_preset_percent"][std::string(name)] = percent;
+    json["fitted"][name] = value;
+    json["from_preset_percent"][name] = percent;
   }
   const auto summary = fmt::format(
       "{} published numbers: rms difference {} %, largest {} %{} ({} iterations, n = {})\n",
-      end.differences.size(), fixed_number(rms_percent, 2), fixed_number(largest_percent, 2),
+      end.residuals.size(), fixed_number(rms_percent, 2), fixed_number(largest_percent, 2),
       missing == 0 ? "" : fmt::format(", {} without ours", missing), end.iteration,
-      end.model.elements_per_link);
+      start.elements_per_link);
   return {.tables = text_of(table) + '\n' + summary, .rows = table, .json = json.dump(2)};
 }
 
 int fit_to_paper(const FitFlags& flags, Console& console) {
   const auto start = paper_start(flags);
-  const auto end = fit_paper(published_table(), start, [&](const PaperFitStep& step) {
-    std::string text = fmt::format("iteration {:>2}:", step.iteration);
-    for (const auto name : kFittedKeys) {
-      const double value = solver::find_model_key(name)->get(step.model);
-      text += fmt::format("  {} = {}", name, readable_number(value, 5));
-    }
-    console.notes() << text << "  rms " << fixed_number(step.summary.rms_percent, 3) << " %\n";
-  });
+  const auto end = fit_paper(published_table(), start,
+                             [&](const std::string& what) { console.notes() << what << '\n'; });
   put_out(console, flags.answer, paper_fit_answer(end, start));
   return kDone;
 }
@@ -180,7 +177,7 @@ struct MeasuredFit {
   Measurements measured = {};
   FitProblem problem = {};
   solver::ModelParameters model = {};
-  /// Axes besides the unknowns, with a value for each row or one for all.
+  /// Axes besides the unknowns, with a value for each row.
   std::vector<std::pair<std::string, std::vector<double>>> conditions = {};
 };
 
@@ -211,7 +208,7 @@ void add_flags(MeasuredFit& fit, PointFlags points, const ReachCheck& check_reac
                       flag_of_key(axis.key())));
     }
     if (given.contains(axis.key())) {
-      fit.conditions.push_back({axis.key(), {axis.values(0)}});
+      fit.conditions.emplace_back(axis.key(), std::vector(fit.measured.rows, axis.values(0)));
     }
   }
 }
@@ -243,18 +240,18 @@ MeasuredFit measured_fit(const FitFlags& flags, const ReachCheck& check_reach) {
 protocol::Block block_of(const MeasuredFit& fit, const std::vector<VectorXd>& points) {
   std::vector<std::string> keys;
   std::vector<std::vector<double>> values;
-  for (std::size_t i = 0; i < fit.problem.unknowns.size(); ++i) {
-    keys.push_back(fit.problem.unknowns[i].name);
-    values.emplace_back();
-    for (const VectorXd& point : points) {
-      values.back().insert(values.back().end(), fit.measured.rows, point[static_cast<Index>(i)]);
-    }
-  }
   for (const auto& [key, of_rows] : fit.conditions) {
     keys.push_back(key);
-    values.emplace_back();
-    for (std::size_t point = 0; point < (of_rows.size() == 1 ? 1 : points.size()); ++point) {
-      values.back().insert(values.back().end(), of_rows.begin(), of_rows.end());
+    auto& all = values.emplace_back();
+    for (std::size_t point = 0; point < points.size(); ++point) {
+      all.insert(all.end(), of_rows.begin(), of_rows.end());
+    }
+  }
+  for (std::size_t i = 0; i < fit.problem.unknowns.size(); ++i) {
+    keys.push_back(fit.problem.unknowns[i].name);
+    auto& all = values.emplace_back();
+    for (const VectorXd& point : points) {
+      all.insert(all.end(), fit.measured.rows, point[static_cast<Index>(i)]);
     }
   }
   return listed_points(keys, values);
@@ -264,23 +261,23 @@ protocol::Block block_of(const MeasuredFit& fit, const std::vector<VectorXd>& po
 std::vector<VectorXd> predictions_of(const Measurements& measured, const protocol::Table& results) {
   std::vector<VectorXd> predictions;
   for (std::size_t first = 0; first < results.rows.size(); first += measured.rows) {
-    auto& prediction = predictions.emplace_back(static_cast<Index>(measured.numbers.size()));
-    Index i = 0;
-    for (const auto& number : measured.numbers) {
-      prediction[i++] = number_in(results.rows[first + number.row][number.output]);
-    }
+    std::ranges::transform(
+        measured.numbers,
+        predictions.emplace_back(static_cast<Index>(measured.numbers.size())).begin(),
+        [&](const MeasuredNumber& number) {
+          return number_in(results.rows.at(first + number.row)[number.output]);
+        });
   }
   return predictions;
 }
 
 /// All that determines the points, for the name of the study.
 std::string settings_of(const MeasuredFit& fit, const FitFlags& flags) {
-  const auto& [unknowns, measured, sd, names, evaluate] = fit.problem;
-  std::string text =
-      fmt::format("{} {} {} {} {}", protocol::canonical_model(fit.model), flags.is_scaled,
-                  fmt::join(flags.fit, " "), fmt::join(measured.begin(), measured.end(), " "),
-                  fmt::join(sd.begin(), sd.end(), " "));
-  text += fmt::format(" {}", fmt::join(fit.measured.outputs, " "));
+  auto text = fmt::format("{} {} {} {}", protocol::canonical_model(fit.model), flags.is_scaled,
+                          fmt::join(flags.fit, " "), fmt::join(fit.measured.outputs, " "));
+  for (const auto& number : fit.measured.numbers) {
+    text += fmt::format(" {} {} {} {}", number.row, number.output, number.value, number.sd);
+  }
   for (const auto& [key, values] : fit.conditions) {
     text += fmt::format(" {} {}", key, fmt::join(values, " "));
   }
@@ -319,8 +316,6 @@ std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fi
     notes.emplace_back(
         "chi2 is larger than the deviations explain: they are too small, the model lacks "
         "something, or another start leads to a lower minimum. --scale widens the intervals.");
-  } else if (fit.has_other_minimum) {
-    notes.emplace_back("chi2 has lower minima: give other starts.");
   }
   return notes;
 }

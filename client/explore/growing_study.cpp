@@ -2,7 +2,6 @@
 
 #include <stdexcept>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -77,7 +76,18 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
   }
   connection_ = std::make_unique<Connection>(where, [this] { return keep_waiting(); });
   *recipe_.mutable_model() = protocol::to_message(model);
-  read_stored();
+  const auto found = connection_->query(
+      fmt::format("SELECT 1 FROM studies WHERE name = {}", server::sql_text(name_)));
+  if (found.rows.empty()) {
+    return;
+  }
+  stored_ = connection_->describe(name_);
+  if (stored_.errors() ||
+      stored_.model().SerializeAsString() != recipe_.model().SerializeAsString()) {
+    throw solver::InputError(fmt::format(
+        "the study \"{}\" exists with another model or with estimated errors: give another --name",
+        name_));
+  }
 }
 
 GrowingStudy::~GrowingStudy() = default;
@@ -92,41 +102,26 @@ bool GrowingStudy::keep_waiting() {
   return !stop_.requested();
 }
 
-void GrowingStudy::read_stored() {
-  const auto found = connection_->query(
-      fmt::format("SELECT count(*) FROM studies WHERE name = {}", server::sql_text(name_)));
-  if (std::get<std::int64_t>(found.rows.at(0).at(0)) == 0) {
-    return;
-  }
-  stored_ = connection_->describe(name_);
-  if (stored_.errors() ||
-      stored_.model().SerializeAsString() != recipe_.model().SerializeAsString()) {
-    throw solver::InputError(fmt::format(
-        "the study \"{}\" exists with another model or with estimated errors: give another --name",
-        name_));
-  }
-}
-
 void GrowingStudy::submit(const protocol::Recipe& recipe) {
   protocol::check_size(recipe);
   const auto reply =
       connection_->submit({.name = name_, .recipe = recipe}, {.no_reuse = no_reuse_});
-  if (!is_submitted_ && reply.created()) {
+  if (std::exchange(is_submitted_, true)) {
+    return;
+  }
+  if (reply.created()) {
     note_coarse_mesh(console_.notes(), recipe);
     note_unusual_values(console_.notes(), recipe);
-  } else if (!is_submitted_) {
+  } else {
     console_.notes() << fmt::format("Continuing \"{}\": {} of {} points are done.\n", name_,
                                     format_count(reply.completed()), format_count(reply.points()));
   }
-  is_submitted_ = true;
 }
 
 void GrowingStudy::wait(const std::string& what) {
   FollowedStudy followed(*connection_, name_);
   const auto ask = [&](const Tell& tell) {
-    if (!keep_waiting()) {
-      throw Interrupted("stopped");
-    }
+    keep_waiting();
     auto status = followed.status(tell);
     if (const auto reason = objection_to_waiting(status); service_ && !reason.empty()) {
       throw std::runtime_error(reason);
@@ -155,24 +150,30 @@ protocol::Table GrowingStudy::solve(const protocol::Block& block, const std::str
         name_, round + 1));
   }
   *recipe_.add_blocks() = block;
-  const std::uint64_t first = points_;
-  points_ += protocol::points_of_block(block);
+  const std::uint64_t first = std::exchange(points_, points_ + protocol::points_of_block(block));
   if (!is_stored || !is_submitted_) {
     submit(is_stored ? stored_ : recipe_);
     wait(what);
   }
-  return connection_->query(
+  auto table = connection_->query(
       fmt::format("SELECT {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} ORDER BY point",
                   columns, server::sql_text(name_), first, points_ - 1));
+  if (table.rows.size() != points_ - first) {
+    throw std::runtime_error(
+        fmt::format("the study \"{}\" has {} of the {} points of its block {}; another command may "
+                    "have renamed or deleted it. The same command solves them again",
+                    name_, table.rows.size(), points_ - first, round + 1));
+  }
+  return table;
 }
 
 protocol::Block listed_points(const std::vector<std::string>& keys,
-                              const std::vector<std::vector<double>>& values) {
-  std::vector<protocol::Axis> axes;
+                              const std::vector<std::vector<double>>& values,
+                              std::vector<protocol::Axis> others) {
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    axes.push_back(protocol::listed_axis(protocol::axis_key(keys[i]), values.at(i)));
+    others.push_back(protocol::listed_axis(protocol::axis_key(keys[i]), values.at(i)));
   }
-  auto block = protocol::block_of(std::move(axes));
+  auto block = protocol::block_of(std::move(others));
   block.set_zip(true);
   return block;
 }

@@ -19,20 +19,20 @@
 
 namespace oblique::client {
 
-/// Where the points of an exploration are solved and stored: at the server that --server or
-/// OBLIQUE_SERVER names, unless --db is given; else here, by a server and workers on this machine.
+/// Flags that choose who solves and stores the points of an exploration: the server that --server
+/// or OBLIQUE_SERVER names, unless --db is given; otherwise a server and workers on this machine.
 struct ExploreFlags {
   SourceFlags source;  ///< --db, --server, --keys, --timeout
   RunSettings run;     ///< --workers, --fall-memory, --no-reuse
-  std::string name;    ///< of the study; empty: `explored_name`
+  std::string name;    ///< name of the study; empty: made by `explored_name`
 };
 
 /// Adds --name, --db, --server, --keys, --timeout, --workers, --fall-memory and --no-reuse. `flags`
 /// must live as long as `command`.
 void add_explore_flags(CLI::App& command, ExploreFlags& flags);
 
-/// --name, or else `verb` and the first eight digits of a digest of `settings`, so that the same
-/// command continues its study. Throws solver::InputError for a name that no study can have.
+/// Returns --name, or else `verb` and the first eight digits of a digest of `settings`, so that the
+/// same command continues its study. Throws solver::InputError for an invalid --name.
 std::string explored_name(const ExploreFlags& flags, std::string_view verb,
                           std::string_view settings);
 
@@ -40,24 +40,24 @@ std::string explored_name(const ExploreFlags& flags, std::string_view verb,
 /// continues, and returns 128 plus the number of the signal.
 int run_exploration(Console& console, const std::function<int(protocol::StopSignals& stop)>& work);
 
-/// A study that grows round by round: each round appends a block, which must be a deterministic
-/// function of the results before it. A stored block is not solved again, so a stopped exploration
-/// is continued by the same calls.
+/// A study that grows round by round. Each round appends a block, which must be a deterministic
+/// function of the results before it. Stored blocks are not solved again, so the same calls
+/// continue an exploration that was stopped.
 class GrowingStudy {
  public:
-  /// Connects to the server, or starts one here with workers, for as long as this object lives.
-  /// Throws solver::InputError when the study of that name exists with another model or with
-  /// estimated errors, std::runtime_error when the database is in use, and what EmbeddedService and
+  /// Connects to the server, or starts one with workers, for as long as this object lives. Throws
+  /// solver::InputError when the study of that name exists with another model or with estimated
+  /// errors, std::runtime_error when the database is in use, and what EmbeddedService and
   /// Connection throw.
   GrowingStudy(Console& console, const ExploreFlags& flags, std::string name,
                const solver::ModelParameters& model, protocol::StopSignals& stop);
   ~GrowingStudy();
 
-  /// Solves the points of `block`, unless they are stored. Returns a row per point, in their order,
-  /// with the values of `columns`: SQL over the view `runs`, as "mode, fn_peak_N"; NULL where the
-  /// point failed. `what` is shown with the progress. Throws solver::InputError when the stored
-  /// study has another block in this place, Interrupted when a signal stops it, and
-  /// std::runtime_error when the study is cancelled meanwhile.
+  /// Solves the points of `block`, unless they are stored. Returns one row per point, in their
+  /// order, with the values of `columns`: SQL over the view `runs`, for example "mode, fn_peak_N";
+  /// NULL where the point failed. `what` is shown with the progress. Throws solver::InputError when
+  /// the stored study has another block in this place, Interrupted when a signal stops it, and
+  /// std::runtime_error when another command cancels, renames or deletes the study.
   protocol::Table solve(const protocol::Block& block, const std::string& columns,
                         const std::string& what);
 
@@ -67,7 +67,6 @@ class GrowingStudy {
 
  private:
   bool keep_waiting();
-  void read_stored();
   void submit(const protocol::Recipe& recipe);
   void wait(const std::string& what);
 
@@ -75,17 +74,19 @@ class GrowingStudy {
   protocol::StopSignals& stop_;
   std::string name_;
   bool no_reuse_;
-  std::unique_ptr<EmbeddedService> service_;  ///< none: a server elsewhere
+  std::unique_ptr<EmbeddedService> service_;  ///< null: the server of --server
   std::unique_ptr<Connection> connection_;
   protocol::Recipe recipe_;    ///< the rounds so far
-  protocol::Recipe stored_;    ///< as the server has it
-  bool is_submitted_ = false;  ///< by this object: a paused or cancelled study runs again
+  protocol::Recipe stored_;    ///< the study that the server had at the start
+  bool is_submitted_ = false;  ///< set by the first submission, which resumes a paused study
   std::uint64_t points_ = 0;
 };
 
-/// A block of listed points: axis i has the value `values[i][p]` at point p, or `values[i][0]` at
-/// all points. Throws solver::InputError for an unknown key.
+/// A block of listed points: the key `keys[i]` has the value `values[i][p]` at point p, or
+/// `values[i][0]` at all points. `others` are axes that are constant or expressions. Throws
+/// solver::InputError for an unknown key.
 protocol::Block listed_points(const std::vector<std::string>& keys,
-                              const std::vector<std::vector<double>>& values);
+                              const std::vector<std::vector<double>>& values,
+                              std::vector<protocol::Axis> others = {});
 
 }  // namespace oblique::client

@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <set>
-#include <tuple>
+#include <span>
 #include <unordered_map>
 #include <utility>
 
 namespace oblique::client {
 namespace {
 
-/// How often cells are halved that a border enters, and that more than two borders enter.
+/// Maximum halvings of a cell whose rim has two crossings, and of a cell with more.
 constexpr std::uint32_t kHalvings = 2;
 constexpr std::uint32_t kMaxHalvings = 4;
 
@@ -22,49 +21,61 @@ struct Position {
   double y;
 };
 
-/// A square cell that is not halved (yet).
+LatticePoint middle_of(const LatticePoint& a, const LatticePoint& b) {
+  return {(a.x + b.x) / 2, (a.y + b.y) / 2};
+}
+
+/// Returns a number that sorts points by y, then by x.
+std::uint64_t key_of(const LatticePoint& point) {
+  return std::uint64_t{point.y} << 32U | point.x;
+}
+
+/// A square cell. Halving replaces it by four.
 struct Cell {
   LatticePoint low;
   std::uint32_t size;
 
+  /// Counterclockwise from `low`.
   std::array<LatticePoint, 4> corners() const {
     const auto [x, y] = low;
     return {{{x, y}, {x + size, y}, {x + size, y + size}, {x, y + size}}};
   }
 };
 
-/// A border that crosses the side of a cell.
+/// A border that crosses the rim of a cell. Its bracket is from a to b, counterclockwise.
 struct Crossing {
-  BorderVertex vertex;  ///< exact only if `width` is 1
+  LatticePoint a;
+  LatticePoint b;
+  int before;           ///< region at a
+  int after;            ///< region at b
   std::uint32_t width;  ///< of the bracket, in steps
-  int after;            ///< region behind it, counterclockwise
-  double way;           ///< from the lower left corner counterclockwise to it, in steps
+  double way;           ///< along the rim from the lower left corner to the middle, in steps
 
-  Position middle() const {
-    const double half = width / 2.0;
-    return {vertex.low.x + (vertex.is_along_x ? half : 0.0),
-            vertex.low.y + (vertex.is_along_x ? 0.0 : half)};
+  Position middle() const { return {(a.x + b.x) / 2.0, (a.y + b.y) / 2.0}; }
+  BorderVertex vertex() const {
+    const bool is_forward = a.x < b.x || a.y < b.y;
+    return {is_forward ? a : b, a.y == b.y, is_forward ? before : after,
+            is_forward ? after : before};
   }
 };
 
 /// A border inside a cell, from crossing a to crossing b.
 struct Chord {
-  std::size_t a;
-  std::size_t b;
-  int region;  ///< to the right, except for what earlier chords cut off
+  Crossing a;
+  Crossing b;
+  int region;  ///< to the right of the chord, in the part that earlier chords leave
   bool meets_others = false;
 };
 
-/// How borders run inside a cell.
+/// The borders inside a cell.
 struct Inside {
-  std::vector<Crossing> crossings = {};  ///< counterclockwise
   std::vector<Chord> chords = {};
-  int rest = 0;  ///< region of what no chord cuts off
+  int rest = 0;  ///< region of the part that no chord cuts off
 
   int region_at(const Position& at) const {
     for (const Chord& chord : chords) {
-      const Position a = crossings[chord.a].middle();
-      const Position b = crossings[chord.b].middle();
+      const Position a = chord.a.middle();
+      const Position b = chord.b.middle();
       if ((b.x - a.x) * (at.y - a.y) < (b.y - a.y) * (at.x - a.x)) {
         return chord.region;
       }
@@ -78,172 +89,147 @@ class BorderSearch {
   BorderSearch(const MapGrid& grid, const RegionsOf& regions_of)
       : grid_(grid), regions_of_(regions_of) {}
 
-  void run();
+  void run() {
+    for (std::uint32_t y = 0; y < grid_.cells; ++y) {
+      for (std::uint32_t x = 0; x < grid_.cells; ++x) {
+        add_cell(cells_, {x * grid_.cell(), y * grid_.cell()}, grid_.cell());
+      }
+    }
+    solve();
+    // Points that are solved for a cell can show borders on the rims of its neighbours, so all
+    // cells are refined again until none changes.
+    for (bool is_refined = true; is_refined;) {
+      is_refined = false;
+      for (auto active = std::exchange(cells_, {}); !active.empty();) {
+        std::vector<Cell> next;
+        for (const Cell& cell : active) {
+          refine(cell, next);
+        }
+        is_refined = is_refined || !next.empty();
+        solve();
+        active = std::move(next);
+      }
+    }
+  }
   Borders borders() const;
 
  private:
-  using Line = std::map<std::uint32_t, int>;  ///< regions of points by one coordinate
-
-  void request(const LatticePoint& point) { requested_.push_back(point); }
+  void request(const LatticePoint& point) {
+    if (!regions_.contains(key_of(point))) {
+      requested_.insert(key_of(point));
+    }
+  }
   /// Solves the requested points.
-  void solve();
-  std::vector<Crossing> crossings_of(const Cell& cell) const;
-  /// Bisects the sides of all cells, and halves cells. Returns false if there was nothing to do.
-  bool refine();
+  void solve() {
+    if (requested_.empty()) {
+      return;
+    }
+    std::vector<LatticePoint> points;
+    for (const std::uint64_t key : requested_) {
+      points.push_back({static_cast<std::uint32_t>(key), static_cast<std::uint32_t>(key >> 32U)});
+    }
+    const auto regions = regions_of_(points);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      regions_[key_of(points[i])] = regions[i];
+    }
+    requested_.clear();
+  }
+  /// Appends a cell, and requests its corners.
+  void add_cell(std::vector<Cell>& cells, const LatticePoint& low, std::uint32_t size) {
+    cells.push_back({low, size});
+    for (const LatticePoint& corner : cells.back().corners()) {
+      request(corner);
+    }
+  }
+  /// Requests the middles of wide brackets, and halves the cell where borders need smaller ones.
+  /// Appends the cell, or its quarters, to `next` if it may change further, else to `cells_`.
+  void refine(const Cell& cell, std::vector<Cell>& next) {
+    const auto crossings = crossings_of(cell);
+    bool is_open = false;
+    for (const Crossing& crossing : crossings) {
+      if (crossing.width > 1) {
+        is_open = true;
+        request(middle_of(crossing.a, crossing.b));
+      }
+    }
+    const std::uint32_t halvings = crossings.size() <= 2 ? kHalvings : kMaxHalvings;
+    if (crossings.empty() || cell.size <= grid_.cell() >> halvings) {
+      (is_open ? next : cells_).push_back(cell);
+      return;
+    }
+    for (const LatticePoint& low : Cell{cell.low, cell.size / 2}.corners()) {
+      add_cell(next, low, cell.size / 2);
+    }
+  }
+
+  /// Appends the crossings from a to b, two solved points; `way` belongs to a.
+  void walk(const LatticePoint& a, const LatticePoint& b, std::uint32_t width, double way,
+            std::vector<Crossing>& crossings) const {
+    const LatticePoint middle = middle_of(a, b);
+    const std::uint32_t half = width / 2;
+    if (half > 0 && regions_.contains(key_of(middle))) {
+      walk(a, middle, half, way, crossings);
+      walk(middle, b, half, way + half, crossings);
+      return;
+    }
+    const int before = regions_.at(key_of(a));
+    const int after = regions_.at(key_of(b));
+    if (before != after) {
+      crossings.push_back({a, b, before, after, width, way + width / 2.0});
+    }
+  }
+  /// The crossings of the rim, counterclockwise from the lower left corner.
+  std::vector<Crossing> crossings_of(const Cell& cell) const {
+    std::vector<Crossing> crossings;
+    const auto corners = cell.corners();
+    for (std::size_t i = 0; i < 4; ++i) {
+      walk(corners[i], corners[(i + 1) % 4], cell.size, static_cast<double>(i) * cell.size,
+           crossings);
+    }
+    return crossings;
+  }
   Inside inside_of(const Cell& cell) const;
   void fill(std::vector<int>& raster, const Cell& cell, const Inside& inside) const;
 
   MapGrid grid_;
   const RegionsOf& regions_of_;
-  std::unordered_map<std::uint32_t, Line> rows_;     ///< by y
-  std::unordered_map<std::uint32_t, Line> columns_;  ///< by x
   std::vector<Cell> cells_;
-  std::vector<LatticePoint> requested_;
+  std::unordered_map<std::uint64_t, int> regions_;  ///< of the solved points by key
+  std::set<std::uint64_t> requested_;               ///< keys of points
 };
 
-void BorderSearch::run() {
-  for (std::uint32_t y = 0; y <= grid_.cells; ++y) {
-    for (std::uint32_t x = 0; x <= grid_.cells; ++x) {
-      request({x * grid_.cell(), y * grid_.cell()});
-      if (x < grid_.cells && y < grid_.cells) {
-        cells_.push_back({requested_.back(), grid_.cell()});
-      }
-    }
-  }
-  solve();
-  while (refine()) {  // halving a cell may show borders on the sides of its neighbours
-  }
-}
-
-void BorderSearch::solve() {
-  const auto order = [](const LatticePoint& point) { return std::pair(point.y, point.x); };
-  std::sort(requested_.begin(), requested_.end(),
-            [&](const auto& a, const auto& b) { return order(a) < order(b); });
-  requested_.erase(std::unique(requested_.begin(), requested_.end()), requested_.end());
-  std::erase_if(requested_, [this](const LatticePoint& point) {
-    const auto row = rows_.find(point.y);
-    return row != rows_.end() && row->second.contains(point.x);
-  });
-  if (requested_.empty()) {
-    return;
-  }
-  const auto regions = regions_of_(requested_);
-  for (std::size_t i = 0; i < requested_.size(); ++i) {
-    const auto& [x, y] = requested_[i];
-    rows_[y].emplace(x, regions[i]);
-    columns_[x].emplace(y, regions[i]);
-  }
-  requested_.clear();
-}
-
-std::vector<Crossing> BorderSearch::crossings_of(const Cell& cell) const {
-  std::vector<Crossing> crossings;
-  for (std::uint32_t side = 0; side < 4; ++side) {  // lower, right, upper, left
-    const bool is_along_x = side % 2 == 0;
-    const bool is_forward = side < 2;
-    const std::uint32_t begin = is_along_x ? cell.low.x : cell.low.y;
-    const std::uint32_t fixed =
-        (is_along_x ? cell.low.y : cell.low.x) + (side == 1 || side == 2 ? cell.size : 0);
-    const Line& line = (is_along_x ? rows_ : columns_).at(fixed);
-    const auto of_side = static_cast<std::ptrdiff_t>(crossings.size());
-    for (auto low = line.find(begin); low->first < begin + cell.size; ++low) {
-      const auto high = std::next(low);
-      if (low->second == high->second) {
-        continue;
-      }
-      const double middle = (low->first - begin + high->first - begin) / 2.0;
-      crossings.push_back(
-          {{is_along_x ? LatticePoint{low->first, fixed} : LatticePoint{fixed, low->first},
-            is_along_x, low->second, high->second},
-           high->first - low->first,
-           is_forward ? high->second : low->second,
-           side * static_cast<double>(cell.size) + (is_forward ? middle : cell.size - middle)});
-    }
-    if (!is_forward) {
-      std::reverse(crossings.begin() + of_side, crossings.end());
-    }
-  }
-  return crossings;
-}
-
-bool BorderSearch::refine() {
-  bool is_refined = false;
-  auto active = std::exchange(cells_, {});
-  while (!active.empty()) {
-    std::vector<Cell> next;
-    for (const Cell& cell : active) {
-      const auto crossings = crossings_of(cell);
-      bool is_open = false;
-      for (const auto& [vertex, width, after, way] : crossings) {
-        if (width > 1) {
-          is_open = true;
-          const std::uint32_t half = width / 2;
-          request({vertex.low.x + (vertex.is_along_x ? half : 0),
-                   vertex.low.y + (vertex.is_along_x ? 0 : half)});
-        }
-      }
-      const bool is_simple = crossings.size() <= 2;
-      if (!crossings.empty() &&
-          cell.size > grid_.cell() >> (is_simple ? kHalvings : kMaxHalvings)) {
-        for (const auto& corner : Cell{cell.low, cell.size / 2}.corners()) {
-          next.push_back({corner, cell.size / 2});
-          for (const auto& point : next.back().corners()) {
-            request(point);
-          }
-        }
-      } else {
-        (is_open ? next : cells_).push_back(cell);
-      }
-    }
-    is_refined = is_refined || !next.empty();
-    solve();
-    active = std::move(next);
-  }
-  return is_refined;
-}
-
-/// Marching squares for any number of regions: the shortest part of the rim whose neighbours are in
-/// one region is cut off by a chord, again and again. The borders of three regions or more that
-/// are left meet in a crossing, that behind the shortest part, so that slivers keep their sides.
+/// Marching squares for any number of regions. The crossings cut the rim into parts. The shortest
+/// part with one region on both sides is cut off by a chord, until there is none. The three
+/// borders or more that are left meet in a crossing that does not bound the shortest part, so that
+/// a sliver keeps both sides.
 Inside BorderSearch::inside_of(const Cell& cell) const {
-  Inside inside{.crossings = crossings_of(cell)};
-  const auto& crossings = inside.crossings;
-  std::vector<std::size_t> open(crossings.size());
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    open[i] = i;
-  }
-  const auto length = [&](std::size_t i) {
-    const double way = crossings[open[(i + 1) % open.size()]].way - crossings[open[i]].way;
-    return way < 0.0 ? way + 4.0 * cell.size : way;
-  };
-  inside.rest = open.empty() ? rows_.at(cell.low.y).at(cell.low.x) : crossings.back().after;
+  auto open = crossings_of(cell);
+  Inside inside{.rest = open.empty() ? regions_.at(key_of(cell.low)) : open.back().after};
   while (!open.empty()) {
     const std::size_t n = open.size();
-    std::size_t shortest = n;
+    std::vector<std::pair<bool, double>> parts;  // behind crossing i: has different sides, length
     for (std::size_t i = 0; i < n; ++i) {
-      if (crossings[open[(i + n - 1) % n]].after == crossings[open[(i + 1) % n]].after &&
-          (shortest == n || length(i) < length(shortest))) {
-        shortest = i;
-      }
+      const Crossing& end = open[(i + 1) % n];
+      const double way = end.way - open[i].way;
+      parts.emplace_back(open[i].before != end.after, way < 0.0 ? way + 4.0 * cell.size : way);
     }
-    if (shortest == n) {
-      std::size_t least = 0;
-      for (std::size_t i = 1; i < n; ++i) {
-        least = length(i) < length(least) ? i : least;
-      }
-      std::rotate(open.begin(), open.begin() + static_cast<std::ptrdiff_t>((least + 2) % n),
+    const auto shortest = std::min_element(parts.begin(), parts.end());
+    const auto a = static_cast<std::size_t>(shortest - parts.begin());
+    if (shortest->first) {
+      std::rotate(open.begin(), open.begin() + static_cast<std::ptrdiff_t>((a + 2) % n),
                   open.end());
       for (std::size_t i = 1; i < n; ++i) {
-        inside.chords.push_back({open[0], open[i], crossings[open[i - 1]].after, true});
+        inside.chords.push_back({open[0], open[i], open[i].before, true});
       }
-      inside.rest = crossings[open[n - 1]].after;
+      inside.rest = open[n - 1].after;
       break;
     }
-    const std::size_t a = open[shortest];
-    const std::size_t b = open[(shortest + 1) % n];
-    inside.chords.push_back({a, b, crossings[a].after});
-    inside.rest = crossings[b].after;
-    std::erase_if(open, [&](std::size_t each) { return each == a || each == b; });
+    const Chord chord{open[a], open[(a + 1) % n], open[a].after};
+    inside.chords.push_back(chord);
+    inside.rest = chord.b.after;
+    std::erase_if(open, [&](const Crossing& each) {
+      return each.way == chord.a.way || each.way == chord.b.way;
+    });
   }
   return inside;
 }
@@ -261,143 +247,130 @@ void BorderSearch::fill(std::vector<int>& raster, const Cell& cell, const Inside
   }
 }
 
-/// Vertices and the chords between them.
-struct BorderGraph {
-  std::vector<std::vector<std::size_t>> neighbours = {};
-  std::set<std::size_t> corners = {};  ///< where curves meet
-
-  void join(std::size_t a, std::size_t b) {
-    neighbours[a].push_back(b);
-    neighbours[b].push_back(a);
-  }
-  /// Follows chords to the end of their curve, and removes them.
-  std::vector<std::size_t> taken_curve(std::size_t vertex) {
-    std::vector<std::size_t> curve{vertex};
-    do {
-      const std::size_t next = neighbours[vertex].front();
-      neighbours[vertex].erase(neighbours[vertex].begin());
-      auto& back = neighbours[next];
-      back.erase(std::find(back.begin(), back.end(), vertex));
-      curve.push_back(next);
-      vertex = next;
-    } while (!corners.contains(vertex) && !neighbours[vertex].empty());
-    return curve;
-  }
-  std::vector<std::vector<std::size_t>> taken_curves() {
-    std::vector<std::vector<std::size_t>> curves;
-    for (const bool is_closed : {false, true}) {  // open curves first, from an end
-      for (std::size_t vertex = 0; vertex < neighbours.size(); ++vertex) {
-        while (!neighbours[vertex].empty() &&
-               (is_closed || neighbours[vertex].size() == 1 || corners.contains(vertex))) {
-          curves.push_back(taken_curve(vertex));
-        }
+/// Joins chords to curves. A curve ends at a corner, or where no chord continues it. `neighbours`
+/// are the other ends of the chords of each vertex.
+std::vector<std::vector<std::size_t>> curves_of(std::vector<std::vector<std::size_t>> neighbours,
+                                                const std::set<std::size_t>& corners) {
+  std::vector<std::vector<std::size_t>> curves;
+  for (const bool is_closed : {false, true}) {  // open curves first, from an end
+    for (std::size_t start = 0; start < neighbours.size(); ++start) {
+      while (!neighbours[start].empty() &&
+             (is_closed || neighbours[start].size() == 1 || corners.contains(start))) {
+        auto& curve = curves.emplace_back(1, start);
+        do {
+          const std::size_t vertex = curve.back();
+          const std::size_t next = neighbours[vertex].front();
+          neighbours[vertex].erase(neighbours[vertex].begin());
+          auto& back = neighbours[next];
+          back.erase(std::find(back.begin(), back.end(), vertex));
+          curve.push_back(next);
+        } while (!corners.contains(curve.back()) && !neighbours[curve.back()].empty());
       }
     }
-    return curves;
   }
-};
+  return curves;
+}
 
 Borders BorderSearch::borders() const {
   Borders borders;
   borders.raster.resize(std::size_t{Borders::kRaster} * Borders::kRaster);
-  BorderGraph graph;
-  std::map<std::tuple<bool, std::uint32_t, std::uint32_t>, std::size_t> numbers;
+  std::vector<std::vector<std::size_t>> neighbours;
+  std::set<std::size_t> corners;
+  std::map<std::pair<bool, std::uint64_t>, std::size_t> numbers;
   const auto number_of = [&](const BorderVertex& vertex) {
-    const auto [place, is_new] = numbers.try_emplace(
-        {vertex.is_along_x, vertex.low.x, vertex.low.y}, borders.vertices.size());
+    const auto [number, is_new] =
+        numbers.try_emplace({vertex.is_along_x, key_of(vertex.low)}, borders.vertices.size());
     if (is_new) {
       borders.vertices.push_back(vertex);
-      graph.neighbours.emplace_back();
+      neighbours.emplace_back();
     }
-    return place->second;
+    return number->second;
   };
   for (const Cell& cell : cells_) {
     const Inside inside = inside_of(cell);
     fill(borders.raster, cell, inside);
     for (const Chord& chord : inside.chords) {
-      const auto a = number_of(inside.crossings[chord.a].vertex);
-      graph.join(a, number_of(inside.crossings[chord.b].vertex));
+      const auto a = number_of(chord.a.vertex());
+      const auto b = number_of(chord.b.vertex());
+      neighbours[a].push_back(b);
+      neighbours[b].push_back(a);
       if (chord.meets_others) {
-        graph.corners.insert(a);
+        corners.insert(a);
       }
     }
   }
-  borders.curves = graph.taken_curves();
+  borders.curves = curves_of(std::move(neighbours), corners);
   return borders;
 }
 
 // ---- Shifts ----
 
+/// A vertex whose border is searched in another solution.
 struct Sample {
   BorderVertex vertex;
   std::size_t curve;
+  std::vector<std::uint32_t> places = {};  ///< along the axis of the bracket, to be solved
   std::uint32_t low = 0;
-  std::uint32_t high = 0;  ///< the border is between; both 0: not found
+  std::uint32_t high = 0;  ///< the border is between low and high; both 0: not found
 
-  std::uint32_t place() const { return vertex.is_along_x ? vertex.low.x : vertex.low.y; }
-  LatticePoint at(std::uint32_t along) const {
-    return vertex.is_along_x ? LatticePoint{along, vertex.low.y}
-                             : LatticePoint{vertex.low.x, along};
+  LatticePoint point_at(std::uint32_t place) const {
+    return vertex.is_along_x ? LatticePoint{place, vertex.low.y}
+                             : LatticePoint{vertex.low.x, place};
   }
-  std::uint32_t middle() const { return low + (high - low) / 2; }
-  double shift() const { return std::abs((low + (high - 1.0)) / 2.0 - place()); }
-};
-
-/// Places around a vertex, ever further from it.
-std::vector<std::uint32_t> places_around(const Sample& sample, const MapGrid& grid) {
-  std::set<std::uint32_t> places{sample.place(), sample.place() + 1};
-  for (std::uint32_t parts = 8; parts <= 8192; parts *= 4) {
-    const std::uint32_t reach = std::min(grid.last() / parts, grid.last() - sample.place());
-    places.insert(sample.place() + reach);
-    places.insert(sample.place() - std::min(grid.last() / parts, sample.place()));
+  /// Distance of a bracket from that of the vertex, in steps.
+  double shift_of(std::uint32_t from, std::uint32_t to) const {
+    return std::abs((from + (to - 1.0)) / 2.0 - vertex.place());
   }
-  return {places.begin(), places.end()};
-}
 
-/// Brackets the nearest borders of the same regions, where there are some.
-void find_brackets(std::vector<Sample>& samples, const MapGrid& grid, const RegionsOf& regions_of) {
-  std::vector<LatticePoint> points;
-  for (const Sample& sample : samples) {
-    for (const auto place : places_around(sample, grid)) {
-      points.push_back(sample.at(place));
+  /// Requests both ends of the vertex' bracket, and places further and further from it.
+  void look_around(const MapGrid& grid) {
+    const std::uint32_t place = vertex.place();
+    std::set<std::uint32_t> around{place, place + 1};
+    for (std::uint32_t parts = 8; parts <= 8192; parts *= 4) {
+      const std::uint32_t reach = grid.last() / parts;
+      around.insert({std::min(place + reach, grid.last()), place - std::min(reach, place)});
     }
+    places.assign(around.begin(), around.end());
   }
-  const auto regions = regions_of(points);
-  std::size_t first = 0;
-  for (Sample& sample : samples) {
-    const auto places = places_around(sample, grid);
+  /// Narrows the bracket, first to the nearest border of the same regions, and requests its middle.
+  void narrow(std::span<const int> regions_of_places) {
+    if (places.size() == 1) {
+      (regions_of_places[0] == vertex.from ? low : high) = places[0];
+    }
     for (std::size_t i = 1; i < places.size(); ++i) {
-      Sample found = sample;
-      found.low = places[i - 1];
-      found.high = places[i];
-      if (regions[first + i - 1] == sample.vertex.from && regions[first + i] == sample.vertex.to &&
-          (sample.high == 0 || found.shift() < sample.shift())) {
-        sample = found;
+      if (regions_of_places[i - 1] == vertex.from && regions_of_places[i] == vertex.to &&
+          (high == 0 || shift_of(places[i - 1], places[i]) < shift_of(low, high))) {
+        low = places[i - 1];
+        high = places[i];
       }
     }
-    first += places.size();
-  }
-}
-
-/// Halves the brackets. Returns false if all are one step wide.
-bool bisect(std::vector<Sample>& samples, const RegionsOf& regions_of) {
-  std::vector<Sample*> open;
-  std::vector<LatticePoint> points;
-  for (Sample& sample : samples) {
-    if (sample.high > sample.low + 1) {
-      open.push_back(&sample);
-      points.push_back(sample.at(sample.middle()));
+    places.clear();
+    if (high > low + 1) {
+      places.push_back(low + (high - low) / 2);
     }
   }
-  if (open.empty()) {
-    return false;
+};
+
+/// Solves the places of the samples and narrows their brackets, until there are no places.
+void find_brackets(std::vector<Sample>& samples, const RegionsOf& regions_of) {
+  while (true) {
+    std::vector<LatticePoint> points;
+    for (const Sample& sample : samples) {
+      for (const std::uint32_t place : sample.places) {
+        points.push_back(sample.point_at(place));
+      }
+    }
+    if (points.empty()) {
+      return;
+    }
+    const auto regions = regions_of(points);
+    std::span<const int> rest = regions;
+    for (Sample& sample : samples) {
+      const std::size_t count = sample.places.size();
+      sample.narrow(rest.first(count));
+      rest = rest.subspan(count);
+    }
   }
-  const auto regions = regions_of(points);
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    const auto middle = open[i]->middle();
-    (regions[i] == open[i]->vertex.from ? open[i]->low : open[i]->high) = middle;
-  }
-  return true;
 }
 
 }  // namespace
@@ -423,21 +396,18 @@ std::vector<CurveShift> find_shifts(const MapGrid& grid, const Borders& borders,
     const auto& vertices = borders.curves[curve];
     for (std::size_t i = std::min(every, vertices.size()) / 2; i < vertices.size(); i += every) {
       samples.push_back({borders.vertices[vertices[i]], curve});
+      samples.back().look_around(grid);
     }
   }
-  if (!samples.empty()) {
-    find_brackets(samples, grid, regions_of);
-  }
-  while (bisect(samples, regions_of)) {
-  }
-  std::vector<std::vector<double>> found(borders.curves.size());
+  find_brackets(samples, regions_of);
   std::vector<CurveShift> shifts(borders.curves.size());
+  std::vector<std::vector<double>> found(shifts.size());
   for (const Sample& sample : samples) {
     ++shifts[sample.curve].checked;
     if (sample.high == 0) {
       ++shifts[sample.curve].lost;
     } else {
-      found[sample.curve].push_back(sample.shift() / grid.last());
+      found[sample.curve].push_back(sample.shift_of(sample.low, sample.high) / grid.last());
     }
   }
   for (std::size_t i = 0; i < shifts.size(); ++i) {

@@ -3,18 +3,17 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
 #include <vector>
+
+#include "client/explore/estimate.h"
 
 // Borders between the regions of a plane, found from the regions of single points.
 namespace oblique::client {
 
-/// A point of the lattice, which has 2^halvings steps a cell along each axis.
+/// A point of the lattice, which has 2^halvings steps per cell along each axis.
 struct LatticePoint {
   std::uint32_t x = 0;
   std::uint32_t y = 0;
-
-  bool operator==(const LatticePoint&) const = default;
 };
 
 struct MapGrid {
@@ -36,35 +35,38 @@ struct BorderVertex {
   bool is_along_x = true;  ///< else along y
   int from = 0;            ///< region at the lower end of the bracket
   int to = 0;              ///< region at its upper end
+
+  /// The lower end of the bracket along its axis.
+  std::uint32_t place() const { return is_along_x ? low.x : low.y; }
 };
 
 struct Borders {
-  /// Side of the raster in cells.
+  /// Pixels of the raster along each axis.
   static constexpr std::uint32_t kRaster = 256;
 
   std::vector<BorderVertex> vertices = {};
   /// Vertex numbers along each border of two regions. A closed curve ends with its first vertex.
   /// Where three regions or more meet, the curves end with a shared vertex.
   std::vector<std::vector<std::size_t>> curves = {};
-  std::vector<int> raster =
-      {};  ///< regions at the middles of its cells, row by row from the lowest
+  /// Regions at the middles of the pixels, row by row from the lowest.
+  std::vector<int> raster = {};
 };
 
-/// Finds borders: a coarse grid is solved, row by row with rising y; sides of cells whose ends are
-/// in different regions are bisected; cells that more than two borders enter are halved.
+/// Finds borders: solves a coarse grid, row by row with rising y, bisects sides of cells whose ends
+/// are in different regions, and halves cells that borders enter.
 ///
 /// An island or sliver that contains no point of the grid is missed, unless a bisection meets it.
 Borders find_borders(const MapGrid& grid, const RegionsOf& regions_of);
 
-/// How far a curve is from the border of the same regions in another solution.
+/// Distances of a curve's vertices from the border of the same regions in another solution.
 struct CurveShift {
-  std::size_t checked = 0;             ///< vertices
-  std::size_t lost = 0;                ///< vertices without such a border within 1/8 of the axis
-  std::optional<double> median = {};   ///< of the others, as a part of the axis
-  std::optional<double> largest = {};  ///< likewise
+  std::size_t checked = 0;  ///< vertices
+  std::size_t lost = 0;     ///< vertices without such a border within 1/8 of the axis
+  double median = kNaN;     ///< shift of the other vertices, as a part of the axis
+  double largest = kNaN;    ///< likewise
 };
 /// The shifts of each curve, from one of `every` vertices and at least one. `regions_of` returns
-/// the regions in the other solution, as on a finer mesh.
+/// the regions in the other solution, for example on a finer mesh.
 std::vector<CurveShift> find_shifts(const MapGrid& grid, const Borders& borders, std::size_t every,
                                     const RegionsOf& regions_of);
 

@@ -3,24 +3,23 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
+#include <map>
 #include <optional>
 #include <string>
-#include <string_view>
-#include <unordered_map>
 #include <utility>
 #include <variant>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
+#include <nlohmann/json.hpp>
 
 #include "client/commands/commands.h"
 #include "client/commands/shared.h"
 #include "client/explore/answer.h"
 #include "client/explore/growing_study.h"
 #include "client/explore/map.h"
-#include "client/explore/map_output.h"
 #include "client/explore/outputs.h"
+#include "client/plot/figure.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
 #include "proto/recipe/blocks.h"
@@ -28,6 +27,7 @@
 #include "proto/recipe/point_table.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
+#include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
@@ -59,98 +59,93 @@ struct MapFlags {
   ExploreFlags explore;
 };
 
-/// --x or --y.
-struct AxisFlag {
+/// An axis of a map, with a value for each step of the lattice.
+struct MapAxis {
   std::string key;
   double from;
   double to;
+  std::uint32_t last;  ///< place of `to`
 
-  /// Parses KEY=FROM:TO. Throws InputError, naming the flag.
-  AxisFlag(const char* flag, const std::string& text) {
-    const auto equals = std::min(text.find('='), text.size());
-    const auto ends =
-        protocol::split(std::string_view(text).substr(std::min(equals + 1, text.size())), ':');
-    const auto first = solver::number_of(ends.front());
-    const auto second = solver::number_of(ends.back());
-    if (ends.size() != 2 || !first || !second) {
-      throw InputError(fmt::format(
-          "{} is required as KEY=FROM:TO, for example mu=0.05:2; got \"{}\"", flag, text));
-    }
-    key = text.substr(0, equals);
-    from = *first;
-    to = *second;
-    protocol::check_ends(protocol::axis_key(key), from, to);
+  /// Both ends are exact. Other values are multiples of 2^-50 times the largest power of two on the
+  /// axis, so that the middle of a bracket minus and plus half its width gives its ends to the bit.
+  double value(std::uint32_t place) const {
+    constexpr int kBits = 50;  // a double has 53
+    const double grain =
+        std::ldexp(1.0, std::ilogb(std::max(std::abs(from), std::abs(to))) - kBits);
+    const double value = from + (to - from) * place / last;
+    return place == 0      ? from
+           : place == last ? to
+                           : std::clamp(std::round(value / grain) * grain, from, to);
   }
 };
 
-/// What tells regions apart: texts, or numbers up to and above a level.
-struct RegionRule {
-  std::string output;
-  std::optional<double> level = {};
+/// Parses --x or --y, KEY=FROM:TO. Throws InputError, naming the flag.
+MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& grid) {
+  const auto parts = protocol::split(text, '=');
+  const auto ends = protocol::split(parts.back(), ':');
+  const auto from = solver::number_of(ends.front());
+  const auto to = solver::number_of(ends.back());
+  if (parts.size() != 2 || ends.size() != 2 || !from || !to) {
+    throw InputError(fmt::format("{} is required as KEY=FROM:TO, for example mu=0.05:2; got \"{}\"",
+                                 flag, text));
+  }
+  const auto& key = protocol::axis_key(parts.front());
+  protocol::check_ends(key, *from, *to);
+  MapAxis axis{std::string(key.name), *from, *to, grid.last()};
+  // Doubles must have a value for each step of the lattice.
+  if (!(*to - *from > grid.last() * std::ldexp(std::max(std::abs(*from), std::abs(*to)), -50))) {
+    throw InputError(fmt::format("{} {}: the ends must differ by more", flag, text));
+  }
+  solver::check_value(key, axis.value(1));  // refuses keys of whole numbers
+  return axis;
+}
 
-  /// Parses --of. Throws InputError.
-  static RegionRule of_flag(const std::string& text) {
-    const auto equals = text.rfind('=');
-    const auto outputs = outputs_of_flag(text.substr(0, equals), true);
-    RegionRule rule{outputs.front()};
-    if (equals != std::string::npos) {
-      rule.level = solver::number_of(text.substr(equals + 1));
-    }
-    const bool is_text = server::kind_of_values(rule.output) == protocol::CellKind::kText;
-    if (outputs.size() != 1 || rule.level.has_value() == is_text) {
-      throw InputError(fmt::format(
-          "--of {}: write mode, major_mode, or COLUMN=LEVEL, as stick_total_s=0", text));
-    }
-    return rule;
+/// Returns SQL over the view `runs` for the region of a point, by --of: the value of a text column,
+/// or which side of the level a number is on. Throws InputError.
+std::string sql_of_region(const std::string& of) {
+  const auto equals = of.rfind('=');
+  const auto outputs = outputs_of_flag(of.substr(0, equals), true);
+  const auto level =
+      equals == std::string::npos ? std::nullopt : solver::number_of(of.substr(equals + 1));
+  const auto& output = outputs.front();
+  const bool is_text = server::kind_of_values(output) == protocol::CellKind::kText;
+  if (outputs.size() != 1 || level.has_value() == is_text || !std::isfinite(level.value_or(0.0))) {
+    throw InputError(
+        fmt::format("--of {}: write mode, major_mode, or COLUMN=LEVEL, as stick_total_s=0", of));
   }
-  std::string name_of(const protocol::Value& value) const {
-    if (std::holds_alternative<std::monostate>(value)) {
-      return "failed";
-    }
-    return level ? fmt::format("{} {} {}", output,
-                               number_in(value) > *level ? ">" : "<=", solver::exact_number(*level))
-                 : std::get<std::string>(value);
+  if (is_text) {
+    return output;
   }
-};
+  const auto side = [&](const char* comparison) {
+    const auto number = solver::exact_number(*level);
+    return fmt::format("WHEN ({}) {} {} THEN {}", output, comparison, number,
+                       server::sql_text(fmt::format("{} {} {}", output, comparison, number)));
+  };
+  return fmt::format("CASE {} {} END", side(">"), side("<="));
+}
+
+/// Returns SQL for the region and, with --over, the number of a point. Throws InputError.
+std::string columns_of(const MapFlags& flags) {
+  std::string columns = sql_of_region(flags.of);
+  if (!flags.over.empty()) {
+    const auto over = outputs_of_flag(flags.over, false, "--over");
+    if (over.size() != 1) {
+      throw InputError(fmt::format("--over {}: a picture shows one output", flags.over));
+    }
+    columns += ", " + over.front();
+  }
+  return columns;
+}
 
 // ---- The points of a map ----
 
-/// Adds the model and the keys with one value of a stored study, except for keys that are given.
-void take_from_study(PointFlags& flags, const protocol::Recipe& stored, const std::string& study) {
-  if (flags.preset != PointFlags().preset || !flags.lengths.empty()) {
-    throw InputError("--preset and --lengths are those of the study: leave them out");
-  }
-  const auto given = flags.axes;
-  for (const auto& block : stored.blocks()) {
-    for (const auto& axis : block.axes()) {
-      const bool is_one = protocol::has_own_values(axis) && protocol::axis_size(axis) == 1;
-      const std::string text =
-          is_one ? solver::exact_number(protocol::axis_value(axis, 0)) : axis.expression();
-      if (!given.contains(axis.key()) &&
-          (text.empty() || flags.axes.try_emplace(axis.key(), text).first->second != text)) {
-        throw InputError(fmt::format("the study \"{}\" has several values of {}: give one with {}",
-                                     study, axis.key(), flag_of_key(axis.key())));
-      }
-    }
-  }
-  const auto model = protocol::from_message(stored.model());
-  for (const auto& key : solver::model_keys()) {
-    if (key.name == "integrator") {
-      flags.axes.try_emplace("integrator", solver::integrator_name(model.integrator));
-    } else if (key.name != "links" && key.name != "length") {
-      flags.axes.try_emplace(std::string(key.name), solver::exact_number(key.get(model)));
-    }
-  }
-  for (const double length_m : model.lengths_m) {
-    flags.lengths += (flags.lengths.empty() ? "" : ",") + solver::exact_number(length_m);
-  }
-}
-
-/// What all points of a map share.
+/// The part of a map that all its points share.
 struct MapPlane {
-  std::array<AxisFlag, 2> axes;
+  MapGrid grid;
+  std::array<MapAxis, 2> axes;  ///< x and y
   solver::ModelParameters model = {};
-  std::vector<protocol::Axis> constants = {};  ///< of one value each, or expressions
+  std::vector<protocol::Axis> constants = {};  ///< axes of one value each, or expressions
+  std::string columns = {};                    ///< SQL for the region and the number of --over
 
   /// The settings that decide which points are solved.
   std::string settings(const MapFlags& flags) const {
@@ -163,7 +158,52 @@ struct MapPlane {
     }
     return text + fmt::format("\n{} {} {}", flags.of, flags.cells, flags.bracket);
   }
+  protocol::Block block_of(const std::vector<LatticePoint>& points, int elements_per_link) const {
+    std::vector<double> x;
+    std::vector<double> y;
+    for (const LatticePoint& point : points) {
+      x.push_back(axes[0].value(point.x));
+      y.push_back(axes[1].value(point.y));
+    }
+    if (elements_per_link == model.elements_per_link) {
+      return listed_points({axes[0].key, axes[1].key}, {x, y}, constants);
+    }
+    return listed_points({axes[0].key, axes[1].key, "elements_per_link"},
+                         {x, y, {static_cast<double>(elements_per_link)}}, constants);
+  }
 };
+
+/// Adds the model and the keys with one value of a stored study, except for keys that are given.
+void take_from_study(PointFlags& flags, const protocol::Recipe& stored, const std::string& study) {
+  if (flags.preset != PointFlags().preset || !flags.lengths.empty()) {
+    throw InputError("--preset and --lengths are those of the study: leave them out");
+  }
+  const auto text_of = [](std::string_view key, double value) {
+    return key == "integrator"
+               ? std::string(solver::integrator_name(static_cast<solver::Integrator>(value)))
+               : solver::exact_number(value);
+  };
+  const auto given = flags.axes;
+  for (const auto& block : stored.blocks()) {
+    for (const auto& axis : block.axes()) {
+      const bool is_one = protocol::has_own_values(axis) && protocol::axis_size(axis) == 1;
+      const std::string text =
+          is_one ? text_of(axis.key(), protocol::axis_value(axis, 0)) : axis.expression();
+      if (!given.contains(axis.key()) &&
+          (text.empty() || flags.axes.try_emplace(axis.key(), text).first->second != text)) {
+        throw InputError(fmt::format("the study \"{}\" has several values of {}: give one with {}",
+                                     study, axis.key(), flag_of_key(axis.key())));
+      }
+    }
+  }
+  const auto model = protocol::from_message(stored.model());
+  for (const auto& key : solver::model_keys()) {
+    if (key.name != "links" && key.name != "length") {
+      flags.axes.try_emplace(std::string(key.name), text_of(key.name, key.get(model)));
+    }
+  }
+  flags.lengths = fmt::format("{}", fmt::join(model.lengths_m, ","));
+}
 
 /// Throws InputError for a value that no point may have, also at the ends of the axes.
 MapPlane plane_of(Console& console, const MapFlags& flags) {
@@ -171,13 +211,19 @@ MapPlane plane_of(Console& console, const MapFlags& flags) {
   const auto stored = flags.study.empty()
                           ? std::optional<protocol::Recipe>()
                           : stored_recipe(console, flags.explore.source, flags.study);
-  MapPlane plane{.axes = {AxisFlag{"--x", flags.x}, AxisFlag{"--y", flags.y}}};
+  const auto grid = MapGrid::of(flags.cells, flags.bracket);
+  MapPlane plane{grid, {parse_axis("--x", flags.x, grid), parse_axis("--y", flags.y, grid)}};
+  plane.columns = columns_of(flags);
+  if (plane.axes[0].key == plane.axes[1].key) {
+    throw InputError(fmt::format("--x and --y are both {}: name two keys", plane.axes[0].key));
+  }
   auto points = flags.points;
-  for (const auto& [key, from, to] : plane.axes) {
-    const auto ends = fmt::format("{},{}", solver::exact_number(from), solver::exact_number(to));
-    if (!points.axes.try_emplace(key, ends).second) {
+  for (const auto& axis : plane.axes) {
+    const auto ends =
+        fmt::format("{},{}", solver::exact_number(axis.from), solver::exact_number(axis.to));
+    if (!points.axes.try_emplace(axis.key, ends).second) {
       throw InputError(
-          fmt::format("{} is an axis of the map: leave {} out", key, flag_of_key(key)));
+          fmt::format("{} is an axis of the map: leave {} out", axis.key, flag_of_key(axis.key)));
     }
   }
   if (stored) {
@@ -186,11 +232,17 @@ MapPlane plane_of(Console& console, const MapFlags& flags) {
   const auto recipe = recipe_of_flags(points, tip_reach(console));
   check_points(protocol::PointTable(recipe), places_of(points));
   plane.model = protocol::from_message(recipe.model());
+  const int elements = plane.model.elements_per_link;
+  if (!protocol::axis_key("elements_per_link").is_allowed(2 * elements)) {
+    throw InputError(fmt::format(
+        "--elements-per-link {} is too many: a map also solves points on twice as many", elements));
+  }
   for (const auto& axis : recipe.blocks(0).axes()) {
     if (axis.key() == plane.axes[0].key || axis.key() == plane.axes[1].key) {
       continue;
     }
-    if (protocol::axis_size(axis) != 1 || axis.has_distribution()) {
+    if (protocol::axis_size(axis) != 1 || axis.has_distribution() ||
+        axis.key() == "elements_per_link") {
       throw InputError(
           fmt::format("{} has several values, and a map needs one", flag_of_key(axis.key())));
     }
@@ -199,77 +251,40 @@ MapPlane plane_of(Console& console, const MapFlags& flags) {
   return plane;
 }
 
-/// Solves the points of a map, round by round.
-class MapSolver {
- public:
-  MapSolver(GrowingStudy& study, const FoundMap& map, const MapPlane& plane, const RegionRule& rule)
-      : study_(study), map_(map), plane_(plane), rule_(rule) {}
-
-  /// Rows of the rule's output and, if any, those of `more`. `elements_per_link` 0: of the model.
-  std::vector<protocol::Row> solve(const std::vector<LatticePoint>& points, int elements_per_link,
-                                   const std::string& more = {}) {
-    std::array<std::vector<double>, 2> values;
-    for (const auto& [x, y] : points) {
-      values[0].push_back(map_.axes[0].value(x));
-      values[1].push_back(map_.axes[1].value(y));
-    }
-    auto axes = plane_.constants;
-    for (const std::size_t axis : {0U, 1U}) {
-      axes.push_back(
-          protocol::listed_axis(protocol::axis_key(plane_.axes.at(axis).key), values.at(axis)));
-    }
-    if (elements_per_link > 0) {
-      axes.push_back(protocol::listed_axis(protocol::axis_key("elements_per_link"),
-                                           {static_cast<double>(elements_per_link)}));
-    }
-    auto block = protocol::block_of(std::move(axes));
-    block.set_zip(true);
-    constexpr std::uint32_t kOtherRounds = 50;  // of halved cells and of the finer mesh
-    return study_
-        .solve(block, rule_.output + (more.empty() ? "" : ", " + more),
-               fmt::format("round {} of about {}", study_.rounds() + 1,
-                           map_.grid.halvings + kOtherRounds))
-        .rows;
-  }
-
-  std::vector<int> regions_of(const std::vector<protocol::Row>& rows) {
-    std::vector<int> regions;
-    for (const auto& row : rows) {
-      const auto [found, is_new] =
-          numbers_.try_emplace(rule_.name_of(row.front()), static_cast<int>(names_.size()));
-      if (is_new) {
-        names_.push_back(found->first);
-      }
-      regions.push_back(found->second);
-    }
-    return regions;
-  }
-  const std::vector<std::string>& names() const { return names_; }
-
- private:
-  GrowingStudy& study_;
-  const FoundMap& map_;
-  const MapPlane& plane_;
-  const RegionRule& rule_;
-  std::vector<std::string> names_;
-  std::unordered_map<std::string, int> numbers_;
+struct MapRegion {
+  std::string name;
+  int first_number;    ///< by the order in which the regions were found
+  double cells = 0.0;  ///< area in cells of the coarse grid, measured on the raster
 };
 
-/// Numbers the regions by their areas, the largest first.
-void set_regions(FoundMap& map, const std::vector<std::string>& names) {
-  std::vector<std::size_t> pixels(names.size());
-  for (const int region : map.borders.raster) {
-    ++pixels[static_cast<std::size_t>(region)];
+/// The result of `oblique map`.
+struct FoundMap {
+  const MapFlags& flags;
+  const MapPlane& plane;
+  const GrowingStudy& study;
+  std::vector<MapRegion> regions = {};  ///< by number, the largest first
+  Borders borders = {};
+  std::vector<CurveShift> shifts = {};  ///< of each curve
+  /// The values of --over at the points of the coarse grid, row by row from the lowest; NaN: none.
+  std::vector<double> over = {};
+
+  const std::string& name_of(int region) const {
+    return regions[static_cast<std::size_t>(region)].name;
   }
-  std::vector<std::size_t> order(names.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](auto one, auto other) { return pixels[one] > pixels[other]; });
-  const double cells_of_pixel = std::pow(static_cast<double>(map.grid.cells) / Borders::kRaster, 2);
-  std::vector<int> numbers(names.size());
-  for (const std::size_t region : order) {
-    numbers[region] = static_cast<int>(map.regions.size());
-    map.regions.push_back({names[region], cells_of_pixel * static_cast<double>(pixels[region])});
+};
+
+/// Measures the regions, and numbers them by area, the largest first.
+void sort_regions(FoundMap& map) {
+  const double cells_of_pixel =
+      std::pow(static_cast<double>(map.plane.grid.cells) / Borders::kRaster, 2);
+  for (const int region : map.borders.raster) {
+    map.regions[static_cast<std::size_t>(region)].cells += cells_of_pixel;
+  }
+  std::stable_sort(map.regions.begin(), map.regions.end(),
+                   [](const auto& a, const auto& b) { return a.cells > b.cells; });
+  std::vector<int> numbers(map.regions.size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    numbers[static_cast<std::size_t>(map.regions[i].first_number)] = static_cast<int>(i);
   }
   const auto renumber = [&](int& region) { region = numbers[static_cast<std::size_t>(region)]; };
   std::for_each(map.borders.raster.begin(), map.borders.raster.end(), renumber);
@@ -279,43 +294,281 @@ void set_regions(FoundMap& map, const std::vector<std::string>& names) {
   }
 }
 
-FoundMap find_map(Console& console, const MapFlags& flags, protocol::StopSignals& stop) {
-  const auto rule = RegionRule::of_flag(flags.of);
-  const auto over = flags.over.empty() ? std::vector<std::string>()
-                                       : outputs_of_flag(flags.over, false, "--over");
-  const MapPlane plane = plane_of(console, flags);
-  const auto grid = MapGrid::of(flags.cells, flags.bracket);
-  const auto axis_of = [&](const AxisFlag& axis) {
-    return MapAxis(axis.key, axis.from, axis.to, grid);
-  };
-  FoundMap map{.study = explored_name(flags.explore, "map", plane.settings(flags)),
-               .of = flags.of,
-               .axes = {axis_of(plane.axes[0]), axis_of(plane.axes[1])},
-               .grid = grid,
-               .bracket = flags.bracket,
-               .over_name = flags.over};
-  GrowingStudy study(console, flags.explore, map.study, plane.model, stop);
-  MapSolver solver(study, map, plane, rule);
-  map.borders = find_borders(grid, [&](const std::vector<LatticePoint>& points) {
-    const bool is_grid = study.rounds() == 0 && !over.empty();
-    const auto rows = solver.solve(points, 0, is_grid ? over.front() : "");
-    for (std::size_t i = 0; is_grid && i < rows.size(); ++i) {
-      map.over.push_back(number_in(rows[i].back()));
+FoundMap find_map(const MapFlags& flags, const MapPlane& plane, GrowingStudy& study) {
+  FoundMap map{flags, plane, study};
+  std::map<std::string, int> numbers;
+  const auto solve = [&](const std::vector<LatticePoint>& points, int elements_per_link) {
+    constexpr std::uint32_t kOtherRounds = 50;  // of halved cells and of the finer mesh
+    const bool is_coarse_grid = study.rounds() == 0;
+    const auto table = study.solve(plane.block_of(points, elements_per_link), plane.columns,
+                                   fmt::format("round {} of about {}", study.rounds() + 1,
+                                               plane.grid.halvings + kOtherRounds));
+    std::vector<int> regions;
+    for (const auto& row : table.rows) {
+      const auto* name = std::get_if<std::string>(&row.front());
+      const auto [region, is_new] =
+          numbers.try_emplace(name ? *name : "failed", static_cast<int>(numbers.size()));
+      if (is_new) {
+        map.regions.push_back({region->first, region->second});
+      }
+      regions.push_back(region->second);
+      if (is_coarse_grid && row.size() > 1) {
+        map.over.push_back(number_in(row.back()));
+      }
     }
-    return solver.regions_of(rows);
-  });
+    return regions;
+  };
+  const int elements = plane.model.elements_per_link;
+  map.borders =
+      find_borders(plane.grid, [&](const auto& points) { return solve(points, elements); });
   constexpr std::size_t kEvery = 16;
-  map.shifts = find_shifts(grid, map.borders, kEvery, [&](const std::vector<LatticePoint>& points) {
-    return solver.regions_of(solver.solve(points, 2 * plane.model.elements_per_link));
-  });
-  map.points = study.points();
-  map.rounds = study.rounds();
-  set_regions(map, solver.names());
+  map.shifts = find_shifts(plane.grid, map.borders, kEvery,
+                           [&](const auto& points) { return solve(points, 2 * elements); });
+  sort_regions(map);
   return map;
 }
 
+// ---- Tables ----
+
+/// A vertex in units of the axes.
+struct VertexValues {
+  double x;
+  double y;
+  double width;
+};
+
+VertexValues values_of(const FoundMap& map, const BorderVertex& vertex) {
+  const auto& axes = map.plane.axes;
+  const MapAxis& along = axes[vertex.is_along_x ? 0 : 1];
+  const double low = along.value(vertex.place());
+  const double width = along.value(vertex.place() + 1) - low;
+  const double middle = low + width / 2.0;
+  return {vertex.is_along_x ? middle : axes[0].value(vertex.low.x),
+          vertex.is_along_x ? axes[1].value(vertex.low.y) : middle, width};
+}
+
+std::string islands_sentence(const FoundMap& map) {
+  const auto size = [&](const MapAxis& axis) {
+    return fmt::format("{} in {}",
+                       solver::readable_number((axis.to - axis.from) / map.plane.grid.cells, 3),
+                       axis.key);
+  };
+  return fmt::format(
+      "An island or sliver of another region that is smaller than a cell, {} by {}, may be missed.",
+      size(map.plane.axes[0]), size(map.plane.axes[1]));
+}
+
+/// The number of regions that tables and the picture show, with the letters A, B, ... The others
+/// are shown together.
+std::size_t shown_regions(const FoundMap& map) {
+  constexpr std::size_t kMaxShown = 16;
+  const double least = std::pow(map.plane.grid.cells, 2) / 400.0;
+  std::size_t shown = std::min(map.regions.size(), kMaxShown);
+  while (shown > 0 && map.regions[shown - 1].cells < least) {
+    --shown;
+  }
+  return shown;
+}
+
+std::string other_regions(const FoundMap& map) {
+  return counted(map.regions.size() - shown_regions(map), "other region", "other regions");
+}
+
+char letter_of(std::size_t region) {
+  return static_cast<char>('A' + region);
+}
+
+protocol::Table table_of_regions(const FoundMap& map) {
+  const double whole = std::pow(map.plane.grid.cells, 2);
+  const auto share = [&](double cells) { return solver::fixed_number(100.0 * cells / whole, 2); };
+  protocol::Table table{{"region", map.flags.of, "share [%]"}};
+  double rest = whole;
+  for (std::size_t i = 0; i < shown_regions(map); ++i) {
+    table.rows.push_back(
+        {std::string{letter_of(i)}, map.regions[i].name, share(map.regions[i].cells)});
+    rest -= map.regions[i].cells;
+  }
+  if (table.rows.size() < map.regions.size()) {
+    table.rows.push_back({"", other_regions(map), share(rest)});
+  }
+  return table;
+}
+
+/// The vertices between each pair of shown regions, and the ranges of their values.
+protocol::Table table_of_borders(const FoundMap& map) {
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<VertexValues>> borders;
+  std::int64_t others = 0;
+  for (const auto& vertex : map.borders.vertices) {
+    const std::pair<std::size_t, std::size_t> sides = std::minmax(vertex.from, vertex.to);
+    if (sides.second < shown_regions(map)) {
+      borders[sides].push_back(values_of(map, vertex));
+    } else {
+      ++others;
+    }
+  }
+  protocol::Table table{{"border", "vertices", map.plane.axes[0].key, map.plane.axes[1].key}};
+  const auto range = [](const std::vector<VertexValues>& vertices, double VertexValues::*axis) {
+    const auto [from, to] = std::ranges::minmax(vertices, {}, axis);
+    return fmt::format("{} to {}", solver::readable_number(from.*axis, 5),
+                       solver::readable_number(to.*axis, 5));
+  };
+  for (const auto& [sides, vertices] : borders) {
+    table.rows.push_back({fmt::format("{} | {}", letter_of(sides.first), letter_of(sides.second)),
+                          static_cast<std::int64_t>(vertices.size()),
+                          range(vertices, &VertexValues::x), range(vertices, &VertexValues::y)});
+  }
+  if (others > 0) {
+    table.rows.push_back({"others", others, "", ""});
+  }
+  return table;
+}
+
+std::string tables_of(const FoundMap& map) {
+  CurveShift all{.largest = 0.0};
+  for (const auto& shift : map.shifts) {
+    all.checked += shift.checked;
+    all.lost += shift.lost;
+    all.largest = std::fmax(all.largest, shift.largest);
+  }
+  const auto borders = map.borders.vertices.empty() ? "" : text_of(table_of_borders(map)) + '\n';
+  return fmt::format(
+      "{}\n{}{} vertices, each in a bracket of at most {} of an axis; {} points in {} rounds\n"
+      "{} of {} checked vertices have no such border within 1/8 of the axis on twice as many "
+      "elements; the others shift by at most {} %.\n{}\n",
+      text_of(table_of_regions(map)), borders, format_count(map.borders.vertices.size()),
+      solver::exact_number(map.flags.bracket), format_count(map.study.points()), map.study.rounds(),
+      all.lost, all.checked, solver::readable_number(100.0 * all.largest, 2),
+      islands_sentence(map));
+}
+
+// ---- Numbers ----
+
+protocol::Table rows_of(const FoundMap& map) {
+  protocol::Table table{{"x", "y", "from", "to", "width", "along"}};
+  for (const auto& vertex : map.borders.vertices) {
+    const auto at = values_of(map, vertex);
+    table.rows.push_back({at.x, at.y, map.name_of(vertex.from), map.name_of(vertex.to), at.width,
+                          vertex.is_along_x ? "x" : "y"});
+  }
+  return table;
+}
+
+std::string json_of(const FoundMap& map) {
+  using Json = nlohmann::ordered_json;
+  Json vertices = Json::array();
+  for (const auto& vertex : map.borders.vertices) {
+    const auto at = values_of(map, vertex);
+    vertices.push_back({{"x", at.x},
+                        {"y", at.y},
+                        {"from", map.name_of(vertex.from)},
+                        {"to", map.name_of(vertex.to)},
+                        {"width", at.width},
+                        {"along", vertex.is_along_x ? "x" : "y"}});
+  }
+  Json regions = Json::array();
+  for (const auto& region : map.regions) {
+    regions.push_back({{"name", region.name}, {"cells", region.cells}});
+  }
+  Json shifts = Json::array();
+  for (const auto& shift : map.shifts) {  // NaN becomes null
+    shifts.push_back({{"checked", shift.checked},
+                      {"lost", shift.lost},
+                      {"median", shift.median},
+                      {"largest", shift.largest}});
+  }
+  return Json{{"x", map.plane.axes[0].key},
+              {"y", map.plane.axes[1].key},
+              {"of", map.flags.of},
+              {"bracket", map.flags.bracket},
+              {"vertices", std::move(vertices)},
+              {"curves", map.borders.curves},
+              {"shifts", std::move(shifts)},
+              {"regions", std::move(regions)},
+              {"study", map.study.name()},
+              {"points", map.study.points()},
+              {"rounds", map.study.rounds()}}
+      .dump(1);
+}
+
+// ---- The picture ----
+
+/// The raster in the colours of the regions.
+plot::Cells cells_of_regions(const FoundMap& map, const plot::Panel& panel) {
+  plot::Cells cells{.name = map.flags.of,
+                    .x = plot::cells_between(panel.x, Borders::kRaster),
+                    .y = plot::cells_between(panel.y, Borders::kRaster)};
+  const std::size_t shown = shown_regions(map);
+  for (std::size_t i = 0; i < shown; ++i) {
+    cells.categories.push_back({.name = map.regions[i].name});
+  }
+  if (shown < map.regions.size()) {
+    cells.categories.push_back({.name = other_regions(map), .is_other = true});
+  }
+  for (const int region : map.borders.raster) {
+    const auto category = std::min(static_cast<std::size_t>(region), shown);
+    ++cells.categories[category].points;
+    cells.values.push_back(static_cast<double>(category));
+    cells.states.push_back(plot::CellState::kSolved);
+    cells.names.push_back(map.name_of(region));
+  }
+  return cells;
+}
+
+/// The values of --over around the points of the coarse grid.
+plot::Cells cells_of_numbers(const FoundMap& map) {
+  const auto around_points = [&](const MapAxis& axis) {
+    std::vector<double> values;
+    for (std::uint32_t i = 0; i <= map.plane.grid.cells; ++i) {
+      values.push_back(axis.value(i * map.plane.grid.cell()));
+    }
+    return plot::cells_around(values, false);
+  };
+  plot::Cells cells{.name = map.flags.over,
+                    .x = around_points(map.plane.axes[0]),
+                    .y = around_points(map.plane.axes[1]),
+                    .values = map.over};
+  for (const double value : map.over) {
+    cells.states.push_back(std::isfinite(value) ? plot::CellState::kSolved
+                                                : plot::CellState::kFailed);
+  }
+  return cells;
+}
+
+plot::Figure figure_of(const FoundMap& map) {
+  plot::Figure figure{
+      .title = fmt::format("Regions of {}", map.flags.of),
+      .subtitle = fmt::format("{}: {} points", map.study.name(), format_count(map.study.points())),
+      .notes = {islands_sentence(map)}};
+  const auto axis_of = [](const MapAxis& axis) {
+    auto shown = plot::axis_of(axis.key, server::unit_of_column(server::column_of_key(axis.key)));
+    shown.range = {axis.from, axis.to};
+    return shown;
+  };
+  plot::Panel panel{.x = axis_of(map.plane.axes[0]), .y = axis_of(map.plane.axes[1])};
+  if (map.over.empty()) {
+    panel.cells = cells_of_regions(map, panel);
+  } else {
+    panel.cells = cells_of_numbers(map);
+    figure.title = fmt::format("{} and borders of {}", map.flags.over, map.flags.of);
+    figure.colours = plot::axis_of(map.flags.over, server::unit_of_column(map.flags.over));
+    figure.colours->span(plot::range_of(map.over));
+  }
+  for (const auto& curve : map.borders.curves) {
+    auto& line = panel.curves.emplace_back(plot::Curve{.mark = plot::Curve::Mark::kBorder});
+    for (const auto number : curve) {
+      const auto vertex = values_of(map, map.borders.vertices[number]);
+      line.x.push_back(vertex.x);
+      line.y.push_back(vertex.y);
+    }
+  }
+  figure.panels.push_back(std::move(panel));
+  return figure;
+}
+
+// ---- The command ----
+
 void check_map_flags(const MapFlags& flags) {
-  constexpr std::uint32_t kMaxCells = 512;  // whose points fit into the definition of a study
+  constexpr std::uint32_t kMaxCells = 512;  // more points do not fit into the definition of a study
   constexpr double kLeastBracket = 1e-8;
   if (flags.cells < 2 || flags.cells > kMaxCells) {
     throw InputError(
@@ -332,9 +585,17 @@ void check_map_flags(const MapFlags& flags) {
 int run_map(const MapFlags& flags, Console& console) {
   check_map_flags(flags);
   return run_exploration(console, [&](protocol::StopSignals& stop) {
-    const auto found = find_map(console, flags, stop);
-    put_out(console, flags.answer, answer_of(found));
-    console.note(fmt::format("The points are the study {}.", found.study));
+    const MapPlane plane = plane_of(console, flags);
+    GrowingStudy study(console, flags.explore,
+                       explored_name(flags.explore, "map", plane.settings(flags)), plane.model,
+                       stop);
+    const auto map = find_map(flags, plane, study);
+    put_out(console, flags.answer,
+            {.tables = tables_of(map),
+             .rows = rows_of(map),
+             .json = json_of(map),
+             .figure = figure_of(map)});
+    console.note(fmt::format("The points are the study {}.", study.name()));
     return kDone;
   });
 }

@@ -30,11 +30,14 @@ bool is_output(std::string_view name) {
           column->values == protocol::CellKind::kInteger);
 }
 
+bool has_column(const CsvFile& file, std::string_view name) {
+  return std::ranges::count(file.columns(), name) > 0;
+}
+
 /// Whether a column has the deviations of another column of the file.
 bool is_deviation(const CsvFile& file, std::string_view name) {
   return name.ends_with(kDeviation) &&
-         std::ranges::find(file.columns(), name.substr(0, name.size() - kDeviation.size())) !=
-             file.columns().end();
+         has_column(file, name.substr(0, name.size() - kDeviation.size()));
 }
 
 /// The key of a column, which queries call E_Pa for E; empty: none.
@@ -61,11 +64,10 @@ std::string key_of_column(const std::string& name) {
 void add_numbers(const CsvFile& file, double relative_sd, Measurements& measured) {
   const std::string& column = measured.outputs.back();
   const auto values = file.numbers(column);
-  std::vector<std::optional<double>> deviations(values.size());
-  if (const std::string name = column + std::string(kDeviation);
-      std::ranges::find(file.columns(), name) != file.columns().end()) {
-    deviations = file.numbers(name);
-  }
+  const auto name_of_sd = fmt::format("{}{}", column, kDeviation);
+  const auto deviations = has_column(file, name_of_sd)
+                              ? file.numbers(name_of_sd)
+                              : std::vector<std::optional<double>>(values.size());
   measured.rows = values.size();
   for (std::size_t row = 0; row < values.size(); ++row) {
     if (!values[row]) {
@@ -74,10 +76,10 @@ void add_numbers(const CsvFile& file, double relative_sd, Measurements& measured
     const double sd = deviations[row].value_or(relative_sd * std::abs(*values[row]));
     const auto name = fmt::format("{}: {}", file.place_of_row(row), column);
     if (!(sd > 0.0)) {
-      throw InputError(fmt::format("{} has {}: fill in the column {}{}, or give --sd 1%", name,
-                                   deviations[row] ? "a standard deviation that is not positive"
-                                                   : "no standard deviation",
-                                   column, kDeviation));
+      throw InputError(fmt::format(
+          "{} has {}: fill in the column {}, or give --sd 1%", name,
+          deviations[row] ? "a standard deviation that is not positive" : "no standard deviation",
+          name_of_sd));
     }
     measured.numbers.push_back({row, measured.outputs.size() - 1, *values[row], sd, name});
   }

@@ -9,7 +9,6 @@
 
 #include "client/explore/estimate.h"
 #include "proto/text.h"
-#include "proto/wire/chunk.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"

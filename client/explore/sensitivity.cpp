@@ -2,37 +2,36 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <random>
-#include <stdexcept>
 #include <utility>
+
+#include <Eigen/Core>
 
 #include "proto/oblique.pb.h"
 
 namespace oblique::client {
 namespace {
 
-/// A whole number below `limit` < 2^32; unlike the standard's distributions, equal everywhere.
-std::uint64_t below(std::uint64_t limit, std::mt19937_64& random) {
+using Eigen::ArrayXd;
+using Eigen::ArrayXXd;
+using Eigen::Index;
+
+/// A whole number below `limit` < 2^32. Unlike the distributions of the C++ library it is the same
+/// on every platform.
+std::uint64_t random_below(std::uint64_t limit, std::mt19937_64& random) {
   return ((random() >> 32U) * limit) >> 32U;
 }
 
-/// Estimators that are functions of the means of terms of the rows.
-struct Estimators {
-  std::vector<std::string> names;  ///< of the measures
-  std::size_t points;              ///< of a row
-  /// Appends the terms of a row, of which all rows have the same number.
-  std::function<void(std::uint64_t row, std::span<const double> values, std::vector<double>& terms)>
-      append_terms;
-  /// The measures one after the other, each of all inputs, from the means over `rows` rows.
-  std::function<std::vector<double>(std::span<const double> means, double rows)> measures;
-};
+/// `numbers` as columns of `size`.
+Eigen::Map<const ArrayXXd> in_columns(std::span<const double> numbers, std::size_t size) {
+  return {numbers.data(), static_cast<Index>(size), static_cast<Index>(numbers.size() / size)};
+}
 
-/// The first of some numbers, with the percentiles of the others that are not NaN.
-Estimate estimate_of(std::span<const double> replicates) {
-  Estimate estimate{.value = replicates.front()};
-  std::vector<double> rising(replicates.begin() + 1, replicates.end());
+/// The first number, with the 2.5 % and 97.5 % percentiles of the others, of which NaN is left out.
+Estimate estimate_of(const ArrayXd& numbers) {
+  Estimate estimate{.value = numbers[0]};
+  std::vector<double> rising(numbers.begin() + 1, numbers.end());
   std::erase_if(rising, [](double value) { return std::isnan(value); });
   if (!rising.empty()) {
     std::sort(rising.begin(), rising.end());
@@ -43,67 +42,45 @@ Estimate estimate_of(std::span<const double> replicates) {
   return estimate;
 }
 
-Sensitivity estimated(const Estimators& estimators, std::span<const double> values,
-                      std::size_t inputs, std::uint64_t seed) {
-  constexpr std::size_t kReplicates = 1000;
-  Sensitivity found;
-  std::vector<double> terms;
-  for (std::uint64_t row = 0; (row + 1) * estimators.points <= values.size(); ++row) {
-    const auto of_row = values.subspan(row * estimators.points, estimators.points);
-    if (std::all_of(of_row.begin(), of_row.end(), [](double f) { return std::isfinite(f); })) {
-      estimators.append_terms(row, of_row, terms);
-      ++found.rows;
-    } else {
-      ++found.dropped;
+/// Measures that are functions of means, with bootstrap intervals. Each column of `terms` belongs
+/// to a row of the design. `measures_of(means, rows)` returns each measure of all inputs, measure
+/// after measure, from the means of the terms.
+Sensitivity estimated(const std::vector<std::string>& measures, std::size_t inputs,
+                      const ArrayXXd& terms, std::uint64_t seed, const auto& measures_of) {
+  constexpr Index kReplicates = 1000;
+  std::vector<Index> used;
+  for (Index row = 0; row < terms.cols(); ++row) {
+    if (terms.col(row).isFinite().all()) {
+      used.push_back(row);
     }
   }
-  // Of each measure and input the estimate and its replicates.
-  std::vector<std::vector<double>> replicates(estimators.names.size() * inputs, {kNaN});
-  if (found.rows >= 2) {
-    replicates.assign(replicates.size(), {});
-    const auto count = static_cast<double>(found.rows);
-    std::vector<double> means(terms.size() / found.rows);
-    std::mt19937_64 random(seed);
-    for (std::size_t replicate = 0; replicate <= kReplicates; ++replicate) {
-      std::fill(means.begin(), means.end(), 0.0);
-      for (std::uint64_t row = 0; row < found.rows; ++row) {
-        const double* term =
-            &terms[means.size() * (replicate == 0 ? row : below(found.rows, random))];
-        for (double& mean : means) {
-          mean += *term++ / count;
-        }
-      }
-      const auto measures = estimators.measures(means, count);
-      for (std::size_t i = 0; i < measures.size(); ++i) {
-        replicates[i].push_back(measures[i]);
-      }
+  const auto rows = static_cast<double>(used.size());
+  // Column 0 has the estimates from all rows, the other columns those from replicates.
+  ArrayXXd estimates =
+      ArrayXXd::Constant(std::ssize(measures) * static_cast<Index>(inputs), 1 + kReplicates, kNaN);
+  std::mt19937_64 random(seed);
+  for (Index replicate = 0; used.size() >= 2 && replicate <= kReplicates; ++replicate) {
+    ArrayXd means = ArrayXd::Zero(terms.rows());
+    for (std::size_t i = 0; i < used.size(); ++i) {
+      means += terms.col(used[replicate == 0 ? i : random_below(used.size(), random)]) / rows;
     }
+    estimates.col(replicate) = measures_of(means, rows);
   }
-  for (std::size_t i = 0; i < replicates.size(); ++i) {
-    if (i % inputs == 0) {
-      found.measures.push_back({estimators.names[i / inputs]});
+  Sensitivity found{.rows = used.size(),
+                    .dropped = static_cast<std::uint64_t>(terms.cols()) - used.size()};
+  Index row = 0;
+  for (const std::string& name : measures) {
+    auto& of_inputs = found.measures.emplace_back(Measure{name}).of_inputs;
+    while (of_inputs.size() < inputs) {
+      of_inputs.push_back(estimate_of(estimates.row(row++)));
     }
-    found.measures.back().of_inputs.push_back(estimate_of(replicates[i]));
   }
   return found;
 }
 
 }  // namespace
 
-double Sensitivity::half_width() const {
-  double widest = 0.0;
-  for (const Measure& measure : measures) {
-    for (const Estimate& estimate : measure.of_inputs) {
-      widest = std::fmax(widest, estimate.half_width());  // ignores NaN
-    }
-  }
-  return widest;
-}
-
 std::vector<double> saltelli_row(std::size_t inputs, std::uint64_t seed, std::uint64_t number) {
-  if (inputs > kMaxSobolInputs) {
-    throw std::out_of_range("Saltelli's design has too many inputs");
-  }
   protocol::Sample sobol;
   sobol.set_kind(protocol::SAMPLE_SOBOL);
   sobol.set_count(sampling::kMaxSamples);
@@ -125,12 +102,12 @@ std::vector<double> morris_trajectory(std::size_t inputs, std::uint64_t seed,
   std::mt19937_64 random(sampling::hashed(seed, number));
   std::vector<double> point(inputs);
   for (double& coordinate : point) {
-    coordinate = (static_cast<double>(below(kLevels, random)) + 0.5) / kLevels;
+    coordinate = (static_cast<double>(random_below(kLevels, random)) + 0.5) / kLevels;
   }
   std::vector<std::size_t> order(inputs);
   std::iota(order.begin(), order.end(), std::size_t{0});
   for (std::size_t i = inputs; i > 1; --i) {  // Fisher and Yates
-    std::swap(order[i - 1], order[below(i, random)]);
+    std::swap(order[i - 1], order[random_below(i, random)]);
   }
   std::vector<double> points = point;
   for (const std::size_t input : order) {
@@ -141,60 +118,50 @@ std::vector<double> morris_trajectory(std::size_t inputs, std::uint64_t seed,
 }
 
 Sensitivity sobol_indices(std::span<const double> values, std::size_t inputs, std::uint64_t seed) {
+  const auto d = static_cast<Index>(inputs);
+  const auto f = in_columns(values, inputs + 2);
   // Any constant may be subtracted; one near the mean keeps the digits of the variance.
   const auto finite =
-      std::find_if(values.begin(), values.end(), [](double f) { return std::isfinite(f); });
+      std::find_if(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
   const double f0 = finite == values.end() ? 0.0 : *finite;
-  const auto append_terms = [f0](std::uint64_t, std::span<const double> f,
-                                 std::vector<double>& terms) {
-    const double a = f[0] - f0;
-    const double b = f[1] - f0;
-    terms.insert(terms.end(), {a + b, a * a + b * b});
-    for (const double of : {f[1], f[0]}) {
-      for (const double of_ab : f.subspan(2)) {
-        terms.push_back((of - of_ab) * (of - of_ab));
-      }
-    }
-  };
-  const auto measures = [inputs](std::span<const double> means, double) {
+  ArrayXXd terms(2 + 2 * d, f.cols());
+  terms.row(0) = (f.row(0) - f0) + (f.row(1) - f0);
+  terms.row(1) = (f.row(0) - f0).square() + (f.row(1) - f0).square();
+  for (Index i = 0; i < d; ++i) {
+    terms.row(2 + i) = (f.row(1) - f.row(2 + i)).square();
+    terms.row(2 + d + i) = (f.row(0) - f.row(2 + i)).square();
+  }
+  const auto measures_of = [d](const ArrayXd& means, double) {
     const double V = means[1] / 2.0 - means[0] * means[0] / 4.0;
-    std::vector<double> indices;
-    for (std::size_t i = 0; i < 2 * inputs; ++i) {
-      const double part = V > 0.0 ? means[2 + i] / (2.0 * V) : kNaN;
-      indices.push_back(i < inputs ? 1.0 - part : part);
-    }
+    ArrayXd indices = means.tail(2 * d) / (V > 0.0 ? 2.0 * V : kNaN);
+    indices.head(d) = 1.0 - indices.head(d);
     return indices;
   };
-  return estimated({{"first", "total"}, inputs + 2, append_terms, measures}, values, inputs, seed);
+  return estimated({"first", "total"}, inputs, terms, seed, measures_of);
 }
 
 Sensitivity morris_effects(std::span<const double> values, std::size_t inputs, std::uint64_t seed) {
-  const auto append_terms = [inputs, seed](std::uint64_t row, std::span<const double> f,
-                                           std::vector<double>& terms) {
-    const auto points = morris_trajectory(inputs, seed, row);
-    std::vector<double> of_row(3 * inputs);
-    for (std::size_t i = 0; i < inputs * inputs; ++i) {
-      const std::size_t step = i / inputs;
-      const double change = points[i + inputs] - points[i];
-      if (change != 0.0) {  // the one input that changes in this step
-        const double effect = (f[step + 1] - f[step]) / change;
-        of_row[i % inputs] = std::abs(effect);
-        of_row[inputs + i % inputs] = effect * effect;
-        of_row[2 * inputs + i % inputs] = effect;
-      }
+  const auto d = static_cast<Index>(inputs);
+  const auto f = in_columns(values, inputs + 1);
+  ArrayXXd effects(d, f.cols());
+  for (Index row = 0; row < f.cols(); ++row) {
+    const auto trajectory = morris_trajectory(inputs, seed, static_cast<std::uint64_t>(row));
+    const auto points = in_columns(trajectory, inputs);
+    for (Index step = 0; step < d; ++step) {
+      const ArrayXd change = points.col(step + 1) - points.col(step);
+      Index input = 0;
+      change.abs().maxCoeff(&input);  // the one that changes
+      effects(input, row) = (f(step + 1, row) - f(step, row)) / change[input];
     }
-    terms.insert(terms.end(), of_row.begin(), of_row.end());
+  }
+  ArrayXXd terms(3 * d, f.cols());
+  terms << effects.abs(), effects.square(), effects;
+  const auto measures_of = [d](ArrayXd means, double rows) {
+    const ArrayXd variances = (means.segment(d, d) - means.tail(d).square()) * rows / (rows - 1.0);
+    means.segment(d, d) = variances.max(0.0).sqrt();
+    return means;
   };
-  const auto measures = [inputs](std::span<const double> means, double rows) {
-    std::vector<double> of_inputs(means.begin(), means.end());
-    for (std::size_t i = inputs; i < 2 * inputs; ++i) {
-      const double mu = means[inputs + i];
-      of_inputs[i] = std::sqrt(std::fmax((means[i] - mu * mu) * rows / (rows - 1.0), 0.0));
-    }
-    return of_inputs;
-  };
-  return estimated({{"mu_star", "sigma", "mu"}, inputs + 1, append_terms, measures}, values, inputs,
-                   seed);
+  return estimated({"mu_star", "sigma", "mu"}, inputs, terms, seed, measures_of);
 }
 
 }  // namespace oblique::client

@@ -10,24 +10,23 @@
 #include "proto/recipe/sampling.h"
 
 // Designs and estimators of global sensitivity analysis. The d inputs are independent and uniform
-// in the unit cube; the caller maps them to the quantiles of their distributions.
+// in the unit cube; the caller maps them to the quantiles of their distributions. A row of a design
+// is several points, each with its d coordinates.
 namespace oblique::client {
 
 /// Maximum number of inputs of Saltelli's design, which needs two dimensions of Sobol's sequence
 /// for each.
 inline constexpr std::size_t kMaxSobolInputs = sampling::kSobolDimensions / 2;
 
-/// Row `number` of Saltelli's design for d inputs: the d + 2 points A, B, A_B^1, ..., A_B^d, each
-/// with its d coordinates. A is the first half and B the second half of point `number` of the
-/// scrambled Sobol sequence in 2d dimensions; A_B^i is A with coordinate i of B. A balanced design
-/// has 2^m rows, beginning with row 0: A. B. Owen, On dropping the first Sobol' point (2022).
-/// Throws std::out_of_range for more than kMaxSobolInputs.
+/// Row `number` of Saltelli's design: the points A, B, A_B^1, ..., A_B^d. A is the first half and B
+/// the second half of point `number` of the scrambled Sobol sequence in 2d dimensions; A_B^i is A
+/// with coordinate i of B. A balanced design has 2^m rows, beginning with row 0: A. B. Owen, On
+/// dropping the first Sobol' point (2022). Throws std::out_of_range for more than kMaxSobolInputs.
 std::vector<double> saltelli_row(std::size_t inputs, std::uint64_t seed, std::uint64_t number);
 
-/// Trajectory `number` of Morris' design for d inputs: d + 1 points, each with its d coordinates.
-/// Each coordinate has one of the levels (j + 1/2)/8, j = 0 ... 7, and changes once, by 1/2 up or
-/// down: M. D. Morris, Factorial sampling plans for preliminary computational experiments,
-/// Technometrics 33 (1991).
+/// Row `number` of Morris' design, a trajectory of d + 1 points. Each coordinate has one of the
+/// levels (j + 1/2)/8, j = 0 ... 7, and changes once, by 1/2 up or down: M. D. Morris, Factorial
+/// sampling plans for preliminary computational experiments, Technometrics 33 (1991).
 std::vector<double> morris_trajectory(std::size_t inputs, std::uint64_t seed, std::uint64_t number);
 
 /// A measure of how much an output depends on each input.
@@ -36,18 +35,15 @@ struct Measure {
   std::vector<Estimate> of_inputs = {};  ///< NaN: undefined
 };
 struct Sensitivity {
-  std::vector<Measure> measures;
-  std::uint64_t rows = 0;     ///< rows or trajectories that were used
-  std::uint64_t dropped = 0;  ///< those with a value that is not finite, dropped whole
-
-  /// Half the width of the widest interval; 0 if no measure is defined.
-  double half_width() const;
+  std::vector<Measure> measures = {};
+  std::uint64_t rows = 0;     ///< rows that were used
+  std::uint64_t dropped = 0;  ///< rows with a value that is not finite
 };
 
 /// Sobol' indices `first` (S_i) and `total` (S_Ti) of the output with these values at the points of
-/// Saltelli's design, row by row: f(A), f(B), f(A_B^1), .... M. J. W. Jansen, Analysis of variance
-/// designs for model output, Comput. Phys. Commun. 117 (1999); A. Saltelli et al., Variance based
-/// sensitivity analysis of model output, Comput. Phys. Commun. 181 (2010), table 2 (c) and (f):
+/// rows 0, 1, ... of Saltelli's design. M. J. W. Jansen, Analysis of variance designs for model
+/// output, Comput. Phys. Commun. 117 (1999); A. Saltelli et al., Variance based sensitivity
+/// analysis of model output, Comput. Phys. Commun. 181 (2010), table 2 (c) and (f):
 ///
 ///   S_i  = 1 - sum_n (f(B) - f(A_B^i))^2 / (2 N V)
 ///   S_Ti =     sum_n (f(A) - f(A_B^i))^2 / (2 N V)
@@ -59,11 +55,11 @@ struct Sensitivity {
 Sensitivity sobol_indices(std::span<const double> values, std::size_t inputs, std::uint64_t seed);
 
 /// Measures of the elementary effects of each input on the output with these values at the points
-/// of trajectories 0, 1, ... of that seed: `mu_star`, the mean of their magnitudes (F. Campolongo,
-/// J. Cariboni and A. Saltelli, An effective screening design for sensitivity analysis of large
+/// of rows 0, 1, ... of Morris' design: `mu_star`, the mean of their magnitudes (F. Campolongo, J.
+/// Cariboni and A. Saltelli, An effective screening design for sensitivity analysis of large
 /// models, Environ. Model. Softw. 22 (2007)), `sigma`, their standard deviation, and `mu`, their
 /// mean. An effect is the change of the output over the change of the coordinate. Intervals as
-/// those of `sobol_indices`; undefined for fewer than two trajectories.
+/// those of `sobol_indices`; undefined for fewer than two rows. `seed` is that of the design.
 Sensitivity morris_effects(std::span<const double> values, std::size_t inputs, std::uint64_t seed);
 
 }  // namespace oblique::client

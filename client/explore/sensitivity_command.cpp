@@ -4,11 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -19,19 +17,10 @@
 #include "client/explore/growing_study.h"
 #include "client/explore/outputs.h"
 #include "client/explore/sensitivity.h"
-#include "client/io/console.h"
 #include "client/io/row_output.h"
-#include "client/plot/figure.h"
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
-#include "proto/program/usage.h"
-#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
-#include "proto/recipe/point_table.h"
-#include "proto/recipe/sampling.h"
-#include "worker/solver/model/errors.h"
-#include "worker/solver/model/number.h"
-#include "worker/solver/model/parameters.h"
 
 namespace oblique::client {
 namespace {
@@ -52,6 +41,9 @@ inputs matter at all. Intervals are 95 %. Each value of keys other than H, mu, e
 fall of its own: give such keys levels, such as 6e10:8e10:16.)help";
 
 constexpr std::array<std::string_view, 2> kMethods{"sobol", "morris"};
+constexpr const char* kMorrisNote =
+    "\nmu_star: mean magnitude of the effects; sigma: their standard deviation; mu: their mean\n";
+
 constexpr std::uint64_t kSeed = 1;
 
 struct SensitivityFlags {
@@ -66,82 +58,75 @@ struct SensitivityFlags {
 
 /// What the flags request, checked.
 struct SensitivityProblem {
-  bool is_sobol = true;                  ///< false: Morris' method
-  protocol::Recipe sample;               ///< a sample with the distributions of the inputs
+  bool is_sobol;             ///< false: Morris' method
+  std::uint64_t first_rows;  ///< of the first round
+  std::vector<std::string> outputs;
+  protocol::Recipe sample = {};          ///< has the distributions of the inputs
   std::vector<std::string> inputs = {};  ///< keys whose values are drawn
-  /// Of each input the value at coordinate 0 < u < 1.
-  std::vector<std::function<double(double u)>> values_at = {};
-  std::vector<std::string> outputs = {};
-  std::uint64_t first_rows = 0;
-
-  /// The points of rows [begin, end) of the design.
-  protocol::Block block_of_rows(std::uint64_t begin, std::uint64_t end) const {
-    const std::size_t d = inputs.size();
-    std::vector<std::vector<double>> values(d);
-    for (std::uint64_t number = begin; number < end; ++number) {
-      const auto row =
-          is_sobol ? saltelli_row(d, kSeed, number) : morris_trajectory(d, kSeed, number);
-      for (std::size_t i = 0; i < row.size(); ++i) {
-        values[i % d].push_back(values_at[i % d](row[i]));
-      }
-    }
-    std::vector<protocol::Axis> axes;
-    std::size_t input = 0;
-    for (const auto& axis : sample.blocks(0).axes()) {
-      axes.push_back(protocol::is_drawn(axis)
-                         ? protocol::listed_axis(protocol::axis_key(axis.key()), values[input++])
-                         : axis);
-    }
-    auto block = protocol::block_of(std::move(axes));
-    block.set_zip(true);
-    return block;
-  }
 };
 
 /// Throws solver::InputError for invalid flags.
 SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach) {
   check(flags.answer);
-  SensitivityProblem problem;
-  problem.is_sobol = choice_of("--method", flags.method, kMethods) == 0;
-  problem.outputs = outputs_of_flag(flags.of, false);
-  if (!(flags.interval > 0.0)) {
-    throw solver::InputError("--interval must be above 0");
-  }
-  problem.first_rows = std::bit_ceil(flags.rows > 0 ? flags.rows : problem.is_sobol ? 512 : 32);
+  const bool is_sobol = choice_of("--method", flags.method, kMethods) == 0;
+  const std::uint64_t usual_rows = is_sobol ? 512 : 32;
+  SensitivityProblem problem{.is_sobol = is_sobol,
+                             .first_rows = std::bit_ceil(flags.rows > 0 ? flags.rows : usual_rows),
+                             .outputs = outputs_of_flag(flags.of, false)};
   PointFlags points = flags.points;
-  points.sample = fmt::format("sobol:{}", problem.first_rows);
+  points.sample = fmt::format("random:{}", problem.first_rows);
   try {
     problem.sample = recipe_of_flags(points, check_reach);
   } catch (const solver::InputError& error) {
-    if (error.fields().key == "sample") {  // not a flag of this command
-      throw solver::InputError(
-          "no value is drawn: give at least one key a distribution or several values, such as --mu "
-          "0.05:1.9");
-    }
-    throw;
+    constexpr const char* kNothingDrawn =
+        "no value is drawn: give at least one key a distribution or several values, such as --mu "
+        "0.05:1.9";
+    throw error.fields().key == "sample" ? solver::InputError(kNothingDrawn) : error;
   }
-  for (const auto& axis : problem.sample.blocks(0).axes()) {
-    if (!protocol::is_drawn(axis)) {
-      continue;
-    }
-    problem.inputs.push_back(axis.key());
-    if (axis.has_distribution()) {
-      problem.values_at.emplace_back(
-          [quantiles = sampling::Quantiles(axis)](double u) { return quantiles.value_at(u); });
-    } else {
-      problem.values_at.emplace_back([axis](double u) {
-        const auto levels = static_cast<double>(protocol::axis_size(axis));
-        return protocol::axis_value(axis, static_cast<std::uint64_t>(u * levels));
-      });
+  protocol::Block& block = *problem.sample.mutable_blocks(0);
+  block.mutable_sample()->set_kind(protocol::SAMPLE_SOBOL);  // a part of the name of the study
+  for (const auto& axis : block.axes()) {
+    if (protocol::is_drawn(axis)) {
+      problem.inputs.push_back(axis.key());
     }
   }
-  if (problem.is_sobol && problem.inputs.size() > kMaxSobolInputs) {
+  if (is_sobol && problem.inputs.size() > kMaxSobolInputs) {
     throw solver::InputError(
         fmt::format("--method sobol allows {} inputs, not {}: find those that matter with --method "
                     "morris, and give the others one value",
                     kMaxSobolInputs, problem.inputs.size()));
   }
   return problem;
+}
+
+/// The points of rows [begin, end) of the design.
+protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t begin,
+                              std::uint64_t end) {
+  const std::size_t d = problem.inputs.size();
+  std::vector<double> coordinates;
+  for (std::uint64_t number = begin; number < end; ++number) {
+    const auto row = (problem.is_sobol ? saltelli_row : morris_trajectory)(d, kSeed, number);
+    coordinates.insert(coordinates.end(), row.begin(), row.end());
+  }
+  protocol::Block block = problem.sample.blocks(0);
+  block.clear_sample();
+  block.set_zip(true);
+  std::size_t input = 0;
+  for (auto& axis : *block.mutable_axes()) {
+    if (!protocol::is_drawn(axis)) {
+      continue;
+    }
+    const auto levels = static_cast<double>(protocol::axis_size(axis));
+    std::vector<double> values;
+    for (std::size_t i = input++; i < coordinates.size(); i += d) {
+      values.push_back(
+          axis.has_distribution()
+              ? sampling::Quantiles(axis).value_at(coordinates[i])
+              : protocol::axis_value(axis, static_cast<std::uint64_t>(coordinates[i] * levels)));
+    }
+    axis = protocol::listed_axis(protocol::axis_key(axis.key()), values);
+  }
+  return block;
 }
 
 /// Prints a note if falls need most of the time of the points of `block`.
@@ -166,108 +151,103 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
   constexpr std::uint64_t kMaxPoints = 500'000;
   constexpr std::uint64_t kMaxValues = 1'900'000;  // that the definition of a study can list
   const std::uint64_t max_points = std::min(kMaxPoints, kMaxValues / problem.inputs.size());
-  const auto columns = fmt::format("{}", fmt::join(problem.outputs, ", "));
   std::vector<std::vector<double>> values(problem.outputs.size());
   std::string of_rounds;
   for (std::uint64_t begin = 0, end = problem.first_rows;; begin = end, end *= 2) {
-    const auto block = problem.block_of_rows(begin, end);
+    const auto block = block_of_rows(problem, begin, end);
     if (begin == 0) {
       note_falls(console, problem, block);
     }
-    const auto table =
-        study.solve(block, columns, fmt::format("round {}{}", study.rounds() + 1, of_rounds));
+    const auto table = study.solve(block, fmt::format("{}", fmt::join(problem.outputs, ", ")),
+                                   fmt::format("round {}{}", study.rounds() + 1, of_rounds));
     std::vector<Sensitivity> found;
     double half_width = 0.0;
     for (std::size_t i = 0; i < values.size(); ++i) {
       for (const auto& row : table.rows) {
         values[i].push_back(number_in(row[i]));
       }
-      const auto estimate = problem.is_sobol ? sobol_indices : morris_effects;
-      found.push_back(estimate(values[i], problem.inputs.size(), kSeed));
-      half_width = std::max(half_width, found.back().half_width());
+      found.push_back((problem.is_sobol ? sobol_indices : morris_effects)(
+          values[i], problem.inputs.size(), kSeed));
+      for (const Measure& measure : found.back().measures) {
+        for (const Estimate& estimate : measure.of_inputs) {
+          half_width = std::fmax(half_width, estimate.half_width());  // ignores NaN
+        }
+      }
     }
     if (!problem.is_sobol || half_width <= interval) {
       return found;
     }
     if (2 * end * (problem.inputs.size() + 2) > max_points) {
-      console.note(
-          fmt::format("Note: the widest interval is ± {} instead of ± {}: twice as many "
-                      "points would be more than {}.",
-                      solver::readable_number(half_width, 2), solver::readable_number(interval),
-                      format_count(max_points)));
+      console.note(fmt::format(
+          "Note: the widest interval is ± {} instead of ± {}: twice as many points would be more "
+          "than {}.",
+          solver::readable_number(half_width, 2), solver::readable_number(interval),
+          format_count(max_points)));
       return found;
     }
     // The width falls as the square root of the rows.
-    of_rounds = fmt::format(" of about {}", static_cast<double>(study.rounds()) +
-                                                std::ceil(2.0 * std::log2(half_width / interval)));
+    const double more_rounds = std::ceil(2.0 * std::log2(half_width / interval));
+    of_rounds = fmt::format(" of about {}", static_cast<double>(study.rounds()) + more_rounds);
   }
 }
 
-/// A row for each output and input.
-protocol::Table rows_of(const SensitivityProblem& problem, const std::vector<Sensitivity>& found) {
+/// The answer has a row, and two bars with intervals, for each output and input.
+Answer sensitivity_answer(const SensitivityProblem& problem, const std::vector<Sensitivity>& found,
+                          const GrowingStudy& study) {
   protocol::Table table{.columns = {"output", "input"}};
   for (const Measure& measure : found.front().measures) {
     append_columns(table, measure.name);
   }
   table.columns.insert(table.columns.end(), {"rows", "dropped"});
-  for (std::size_t output = 0; output < problem.outputs.size(); ++output) {
-    const Sensitivity& sensitivity = found[output];
-    for (std::size_t i = 0; i < problem.inputs.size(); ++i) {
-      auto& row =
-          table.rows.emplace_back(protocol::Row{problem.outputs[output], problem.inputs[i]});
-      for (const Measure& measure : sensitivity.measures) {
-        append_values(row, measure.of_inputs[i]);
-      }
-      row.emplace_back(static_cast<std::int64_t>(sensitivity.rows));
-      row.emplace_back(static_cast<std::int64_t>(sensitivity.dropped));
-    }
-  }
-  return table;
-}
-
-/// Bars with intervals: a row of two panels for each output, with its first two measures.
-plot::Figure figure_of(const SensitivityProblem& problem, const std::vector<Sensitivity>& found,
-                       std::uint64_t points) {
   plot::Figure figure{
       .title = problem.is_sobol ? "Sobol\u2019 indices" : "Morris\u2019 elementary effects",
-      .subtitle = fmt::format("{} points, 95 % intervals", format_count(points)),
+      .subtitle = fmt::format("{} points, 95 % intervals", format_count(study.points())),
       .columns = 2,
       .panel_size = {400.0, 90.0 + 26.0 * static_cast<double>(problem.inputs.size())}};
-  for (std::size_t output = 0; output < problem.outputs.size(); ++output) {
-    for (std::size_t i = 0; i < 2; ++i) {
-      const Measure& measure = found[output].measures[i];
+  for (std::size_t output = 0; output < found.size(); ++output) {
+    const auto& [measures, rows, dropped] = found[output];
+    for (std::size_t i = 0; i < problem.inputs.size(); ++i) {
+      protocol::Row row{problem.outputs[output], problem.inputs[i]};
+      for (const Measure& measure : measures) {
+        append_values(row, measure.of_inputs[i]);
+      }
+      row.insert(row.end(), {static_cast<std::int64_t>(rows), static_cast<std::int64_t>(dropped)});
+      table.rows.push_back(std::move(row));
+    }
+    for (const Measure& measure : std::span(measures).first(2)) {
       plot::Panel panel{.title = problem.outputs[output],
                         .x = {.label = measure.name, .name = measure.name},
                         .y = {.name = "input"},
                         .bars = plot::Bars{.names = problem.inputs}};
       plot::Range range{0.0, problem.is_sobol ? 1.0 : 0.0};
-      for (const Estimate& estimate : measure.of_inputs) {
-        panel.bars->heights.push_back(std::isnan(estimate.value) ? 0.0 : estimate.value);
-        panel.bars->intervals.push_back({estimate.from, estimate.to});
-        range = {std::fmin(range.from, estimate.from), std::fmax(range.to, estimate.to)};
+      for (const auto& [value, from, to] : measure.of_inputs) {
+        panel.bars->heights.push_back(std::isnan(value) ? 0.0 : value);
+        panel.bars->intervals.push_back({from, to});
+        range = {std::fmin(range.from, from), std::fmax(range.to, to)};
       }
       panel.x.span(range, 0.02);
       figure.panels.push_back(std::move(panel));
     }
   }
-  return figure;
+  auto answer = answer_of({{"study", study.name()},
+                           {"method", problem.is_sobol ? kMethods[0] : kMethods[1]},
+                           {"inputs", problem.inputs},
+                           {"points", study.points()}},
+                          std::move(table), std::move(figure));
+  answer.tables += problem.is_sobol ? "" : kMorrisNote;
+  return answer;
 }
 
 int sensitivity(const SensitivityFlags& flags, Console& console) {
   const SensitivityProblem problem = problem_of(flags, tip_reach(console));
-  const std::string settings = fmt::format("{} {}", protocol::recipe_digest(problem.sample),
-                                           problem.is_sobol ? kMethods[0] : kMethods[1]);
+  const std::string settings =
+      fmt::format("{} {}", protocol::recipe_digest(problem.sample), flags.method);
   return run_exploration(console, [&](protocol::StopSignals& stop) {
     GrowingStudy study(console, flags.explore,
                        explored_name(flags.explore, "sensitivity", settings),
                        protocol::from_message(problem.sample.model()), stop);
     const auto found = sensitivities_of(console, problem, flags.interval, study);
-    put_out(console, flags.answer,
-            answer_of({{"study", study.name()},
-                       {"method", flags.method},
-                       {"inputs", problem.inputs},
-                       {"points", study.points()}},
-                      rows_of(problem, found), figure_of(problem, found, study.points())));
+    put_out(console, flags.answer, sensitivity_answer(problem, found, study));
     return kDone;
   });
 }
@@ -289,12 +269,13 @@ void add_sensitivity(CLI::App& app, Action& parsed) {
       .add_option("--rows", flags.rows,
                   "rows of the first round (default 512) or trajectories (default 32), rounded up "
                   "to a power of two")
-      ->check(protocol::whole_number_from(2))
+      ->check(CLI::Range(2, 100'000))
       ->type_name("N");
   command
       .add_option("--interval", flags.interval,
                   "double the rows until each index is known to ± HALF: half the width of its 95 % "
                   "interval")
+      ->check(protocol::number_between(1e-9, 1e9))
       ->type_name("HALF")
       ->capture_default_str();
   add_answer_flags(command, flags.answer);

@@ -13,33 +13,21 @@ namespace {
 /// The 97.5 % quantile of the standard normal distribution.
 constexpr double kZ = 1.959963984540054;
 
+/// Differences from the mean, exactly 0 for constant values, whose mean may be rounded.
 Eigen::ArrayXd deviations(std::span<const double> values) {
   const Eigen::Map<const Eigen::ArrayXd> x(values.data(), std::ssize(values));
-  return x - x.mean();
+  return x - ((x == x[0]).all() ? x[0] : x.mean());
 }
 
-/// The smallest k with P(B <= k) >= `share`, for B binomial of n draws with probability p.
-std::size_t binomial_quantile(std::size_t n, double p, double share) {
-  const auto draws = static_cast<double>(n);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < n; ++k) {
-    const auto hits = static_cast<double>(k);
-    sum += std::exp(std::lgamma(draws + 1.0) - std::lgamma(hits + 1.0) -
-                    std::lgamma(draws - hits + 1.0) + hits * std::log(p) +
-                    (draws - hits) * std::log1p(-p));
-    if (sum >= share) {
-      return k;
-    }
-  }
-  return n;
+/// The probability of k hits in n draws that hit with probability p.
+double binomial_probability(double n, double k, double p) {
+  return std::exp(std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0) +
+                  k * std::log(p) + (n - k) * std::log1p(-p));
 }
 
 }  // namespace
 
 Estimate mean_of(std::span<const double> values) {
-  if (values.empty()) {
-    return {};
-  }
   const auto n = static_cast<double>(values.size());
   const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
   const double half = kZ * deviation_of(values) / std::sqrt(n);
@@ -60,11 +48,14 @@ Estimate quantile_of(std::span<const double> ascending, double p) {
   const double place = static_cast<double>(n - 1) * p;
   const auto below = static_cast<std::size_t>(place);
   const std::size_t above = std::min(below + 1, n - 1);
-  // P(B < l) <= 0.025 for the largest l with P(B <= l - 1) <= 0.025, which is the smallest k with
-  // P(B <= k) > 0.025; P(B <= u - 1) >= 0.975 for u one above such a k.
-  constexpr double kTail = 0.025;
-  const std::size_t l = binomial_quantile(n, p, std::nextafter(kTail, 1.0));
-  const std::size_t u = binomial_quantile(n, p, 1.0 - kTail) + 1;
+  std::size_t l = 0;
+  std::size_t u = 1;
+  double sum = 0.0;  // P(B <= k)
+  for (std::size_t k = 0; k < n && sum < 0.975; ++k) {
+    sum += binomial_probability(static_cast<double>(n), static_cast<double>(k), p);
+    l += sum <= 0.025 ? 1 : 0;
+    u += sum < 0.975 ? 1 : 0;
+  }
   return {std::lerp(ascending[below], ascending[above], place - static_cast<double>(below)),
           l >= 1 ? ascending[l - 1] : kNaN, u <= n ? ascending[u - 1] : kNaN};
 }

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,17 +17,10 @@
 #include "client/explore/answer.h"
 #include "client/explore/outputs.h"
 #include "client/explore/uncertainty.h"
-#include "client/io/console.h"
-#include "client/plot/figure.h"
 #include "client/plot/plot_request.h"
-#include "client/service/connection.h"
-#include "client/service/source.h"
 #include "client/service/watching.h"
-#include "proto/oblique.pb.h"
-#include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
-#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client {
@@ -53,109 +46,92 @@ struct UncertaintyFlags {
   AnswerFlags answer;
 };
 
-/// What is stored of the study.
+/// The results of a study.
 struct SampledStudy {
+  std::vector<std::string> outputs;
+  std::vector<double> shares;            ///< of the quantiles: 0.5 for the median
   std::vector<std::string> inputs = {};  ///< keys
-  std::vector<std::string> outputs = {};
-  plot::Answer columns = {};        ///< of the inputs and outputs, rows by point
-  std::vector<double> shares = {};  ///< of the quantiles: 0.5 for the median
+  plot::Answer columns = {};             ///< inputs, then outputs; a row for each point
 };
 
-struct Statistic {
-  std::string name;
-  Estimate estimate;
-};
+using Statistic = std::pair<std::string, Estimate>;
 
-/// Mean, deviation, quantiles and correlations of an output over the first `points` rows.
-std::vector<Statistic> statistics_of_numbers(const SampledStudy& study,
-                                             const std::vector<double>& numbers,
-                                             std::size_t points) {
-  const auto with_value = [&](const std::vector<double>& column) {
+/// The statistics of output number `output` over the first `points` rows: the probability of each
+/// text, or the mean, deviation, quantiles and correlations of numbers.
+std::vector<Statistic> statistics_of(const SampledStudy& study, std::size_t output,
+                                     std::size_t points) {
+  const auto& column = study.columns[study.inputs.size() + output];
+  std::vector<Statistic> statistics;
+  if (column.has_texts()) {
+    std::vector<std::uint64_t> hits(column.words.size());
+    for (std::size_t row = 0; row < points; ++row) {
+      if (const auto word = column.word(row); word != plot::AnswerColumn::kNoWord) {
+        ++hits[word];
+      }
+    }
+    const auto sum = std::accumulate(hits.begin(), hits.end(), std::uint64_t{0});
+    for (std::size_t word = 0; word < hits.size(); ++word) {
+      statistics.emplace_back("probability " + column.words[word], probability_of(hits[word], sum));
+    }
+    return statistics;
+  }
+  const auto where_finite = [&](const std::vector<double>& numbers) {
     std::vector<double> values;
     for (std::size_t row = 0; row < points; ++row) {
-      if (std::isfinite(numbers[row])) {
-        values.push_back(column[row]);
+      if (std::isfinite(column.numbers[row])) {
+        values.push_back(numbers[row]);
       }
     }
     return values;
   };
-  const auto values = with_value(numbers);
-  std::vector<Statistic> statistics{{"mean", mean_of(values)},
-                                    {"sd", {.value = deviation_of(values)}}};
+  const auto values = where_finite(column.numbers);
+  statistics = {{"mean", mean_of(values)}, {"sd", Estimate{deviation_of(values)}}};
   auto ascending = values;
   std::sort(ascending.begin(), ascending.end());
   for (const double share : study.shares) {
-    statistics.push_back(
-        {"quantile " + solver::exact_number(share), quantile_of(ascending, share)});
+    statistics.emplace_back("quantile " + solver::exact_number(share),
+                            quantile_of(ascending, share));
   }
   for (std::size_t i = 0; i < study.inputs.size(); ++i) {
-    const auto input = with_value(study.columns[i].numbers);
-    statistics.push_back({"correlation " + study.inputs[i], correlation_of(input, values)});
+    statistics.emplace_back("correlation " + study.inputs[i],
+                            correlation_of(where_finite(study.columns[i].numbers), values));
   }
   return statistics;
 }
 
-/// The probability of each text among the first `points` rows.
-std::vector<Statistic> statistics_of_texts(const plot::AnswerColumn& column, std::size_t points) {
-  std::vector<std::uint64_t> hits(column.words.size());
-  std::uint64_t sum = 0;
-  for (std::size_t row = 0; row < points; ++row) {
-    if (const auto word = column.word(row); word != plot::AnswerColumn::kNoWord) {
-      ++hits[word];
-      ++sum;
+/// Adds the statistics of an output to the table, texts by falling probability, and lines at its
+/// quantiles to its histogram.
+void add_output(const SampledStudy& study, std::size_t output, protocol::Table& table,
+                plot::Panel& histogram) {
+  const std::size_t points = study.columns.front().numbers.size();
+  const auto statistics = statistics_of(study, output, points);
+  std::vector<protocol::Row> rows;
+  for (const auto& [name, estimate] : statistics) {
+    append_values(rows.emplace_back(protocol::Row{study.outputs[output], name}), estimate);
+  }
+  for (const std::size_t divisor : {2U, 4U, 8U}) {
+    const auto of_first = statistics_of(study, output, points / divisor);
+    for (std::size_t row = 0; row < rows.size(); ++row) {
+      rows[row].push_back(value_of(of_first[row].second.value));
     }
   }
-  std::vector<Statistic> statistics;
-  for (std::size_t word = 0; word < hits.size(); ++word) {
-    statistics.push_back({"probability " + column.words[word], probability_of(hits[word], sum)});
-  }
-  return statistics;
-}
-
-/// The statistics of all outputs, texts by falling probability.
-protocol::Table rows_of(const SampledStudy& study) {
-  protocol::Table table{.columns = {"output", "statistic"}};
-  append_columns(table, "value");
-  table.columns.insert(table.columns.end(), {"half", "quarter", "eighth"});
-  for (std::size_t i = 0; i < study.outputs.size(); ++i) {
-    const auto& column = study.columns[study.inputs.size() + i];
-    const auto of_first = [&](std::size_t points) {
-      return column.has_texts() ? statistics_of_texts(column, points)
-                                : statistics_of_numbers(study, column.numbers, points);
-    };
-    const std::size_t points = column.numbers.size();
-    std::vector<protocol::Row> rows;
-    for (const auto& [name, estimate] : of_first(points)) {
-      append_values(rows.emplace_back(protocol::Row{study.outputs[i], name}), estimate);
+  histogram.title = study.outputs[output];
+  if (study.columns[study.inputs.size() + output].has_texts()) {
+    std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
+      return std::get<double>(a[2]) > std::get<double>(b[2]);
+    });
+    histogram.y.label.clear();  // the title names it
+  } else {
+    for (std::size_t i = 0; i < study.shares.size(); ++i) {
+      const double value = statistics[2 + i].second.value;
+      histogram.curves.push_back(
+          {.name = fmt::format("{} % quantile", solver::readable_number(100.0 * study.shares[i])),
+           .x = {value, value},
+           .y = {0.0, histogram.y.range.to},
+           .stroke = i + 1});
     }
-    for (const std::size_t divisor : {2U, 4U, 8U}) {
-      const auto statistics = of_first(points / divisor);
-      for (std::size_t row = 0; row < rows.size(); ++row) {
-        rows[row].push_back(value_of(statistics[row].estimate.value));
-      }
-    }
-    if (column.has_texts()) {
-      std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
-        return std::get<double>(a[2]) > std::get<double>(b[2]);
-      });
-    }
-    table.rows.insert(table.rows.end(), rows.begin(), rows.end());
   }
-  return table;
-}
-
-/// Adds a line at each quantile to the histogram of an output.
-void add_quantiles(plot::Panel& panel, const SampledStudy& study, std::vector<double> numbers) {
-  std::erase_if(numbers, [](double value) { return !std::isfinite(value); });
-  std::sort(numbers.begin(), numbers.end());
-  for (const double share : study.shares) {
-    const double value = quantile_of(numbers, share).value;
-    panel.curves.push_back(
-        {.name = fmt::format("{} % quantile", solver::readable_number(100.0 * share)),
-         .x = {value, value},
-         .y = {0.0, panel.y.range.to},
-         .stroke = panel.curves.size() + 1});
-  }
+  table.rows.insert(table.rows.end(), rows.begin(), rows.end());
 }
 
 int uncertainty(const UncertaintyFlags& flags, Console& console) {
@@ -166,8 +142,7 @@ int uncertainty(const UncertaintyFlags& flags, Console& console) {
   const auto source = open_source(console, flags.source);
   const auto status = study_named(*source, flags.study);
   const auto recipe = stored_recipe(console, flags.source, flags.study);
-  if (recipe.blocks_size() != 1 ||
-      protocol::block_kind(recipe.blocks(0)) != protocol::BlockKind::kSample) {
+  if (recipe.blocks_size() != 1 || !recipe.blocks(0).has_sample()) {
     throw solver::InputError(fmt::format(
         "the points of \"{}\" are not one sample, so shares of them are no probabilities: run a "
         "study with --sample random:4000",
@@ -181,39 +156,34 @@ int uncertainty(const UncertaintyFlags& flags, Console& console) {
       query.select += axis.column + ", ";
     }
   }
-  plot::Figure figure{.title = flags.study,
-                      .columns = std::min<std::size_t>(2, study.outputs.size())};
   query.select += fmt::format("{}", fmt::join(study.outputs, ", "));
   study.columns = plot::read_columns(*source->rows(request_for(query)));
   if (study.columns.front().numbers.empty()) {
     throw std::runtime_error(fmt::format("no point of \"{}\" has a result{}", flags.study,
                                          flags.where.empty() ? "" : " that meets --where"));
   }
-  const std::string kind(protocol::name_of(recipe.blocks(0).sample().kind()));
   if (const auto open = protocol::open_points(status); open + status.failed() > 0) {
     console.note(fmt::format("Note: of {} points {} failed and {} have no result yet.",
                              format_count(status.points()), format_count(status.failed()),
                              format_count(open)));
   }
+  protocol::Table table{.columns = {"output", "statistic"}};
+  append_columns(table, "value");
+  table.columns.insert(table.columns.end(), {"half", "quarter", "eighth"});
+  plot::Figure figure{.title = flags.study,
+                      .columns = std::min<std::size_t>(2, study.outputs.size())};
   for (std::size_t i = 0; i < study.outputs.size(); ++i) {
     histogram.histogram = study.outputs[i];
-    auto of_output = plot::figure_of(*source, shape, histogram, [](const std::string&) {});
-    auto& panel = figure.panels.emplace_back(std::move(of_output.panels.front()));
-    panel.title = study.outputs[i];
-    const auto& column = study.columns[study.inputs.size() + i];
-    if (column.has_texts()) {
-      panel.y.label.clear();  // the title names it
-    } else {
-      add_quantiles(panel, study, column.numbers);
-    }
+    auto drawn = plot::figure_of(*source, shape, histogram, [](const std::string&) {});
+    add_output(study, i, table, figure.panels.emplace_back(std::move(drawn.panels.front())));
   }
   put_out(console, flags.answer,
           answer_of({{"study", flags.study},
-                     {"sample", kind},
+                     {"sample", protocol::name_of(recipe.blocks(0).sample().kind())},
                      {"inputs", study.inputs},
                      {"points", status.points()},
                      {"failed", status.failed()}},
-                    rows_of(study), std::move(figure)));
+                    std::move(table), std::move(figure)));
   return kDone;
 }
 

@@ -28,7 +28,7 @@ using solver::readable_number;
 
 constexpr double kMicro = 1e6;
 constexpr double kMilli = 1e3;
-/// Below this margin, changes in the fifth digit of H, mu or e* change the mode
+/// If the margin of a mode is smaller, a change in the fifth digit of H, mu or e* changes the mode
 /// (worker/solver/reference/theory.md).
 constexpr double kDoubtfulMargin = 1e-4;
 
@@ -107,7 +107,7 @@ void print_reactions(std::ostream& out, const std::vector<solver::ReactionPeak>&
   }
 }
 
-/// Each error in percent of the output's scale; see worker/solver/accuracy.md.
+/// Prints each estimated error in percent of the output's scale (worker/solver/accuracy.md).
 void print_errors(std::ostream& out, const solver::ErrorEstimate& errors) {
   if (!errors.mode_same) {
     return;

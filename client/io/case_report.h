@@ -8,10 +8,10 @@
 
 namespace oblique::client {
 
-/// One result as `solve --json` prints it: SI units, names as in the database.
+/// Returns one result as `solve --json` prints it: SI units, names as in the database.
 nlohmann::ordered_json json_of(const solver::CaseResult& result);
 
-/// Prints the report of one result.
+/// Prints the report that `solve` shows for one result.
 void print_summary(std::ostream& out, const solver::CaseResult& result);
 
 }  // namespace oblique::client

@@ -38,7 +38,7 @@ std::size_t bytes_in(const Descriptor& file) {
              : 0;
 }
 
-/// Reads a memory file from byte `from`.
+/// Reads an in-memory file from byte `from` to its end.
 std::string text_in(const Descriptor& file, std::size_t from) {
   std::string text(bytes_in(file) - from, '\0');
   const auto got = pread(file.number(), text.data(), text.size(), static_cast<off_t>(from));
@@ -46,7 +46,7 @@ std::string text_in(const Descriptor& file, std::size_t from) {
   return text;
 }
 
-/// Our environment without variables that begin with `hidden`; an empty `hidden` keeps all.
+/// Returns our environment without variables that begin with `hidden`, or all if it is empty.
 std::vector<char*> environment_without(const std::string& hidden) {
   std::vector<char*> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {
@@ -58,8 +58,9 @@ std::vector<char*> environment_without(const std::string& hidden) {
   return variables;
 }
 
-/// Starts `settings.program` with these standard streams; -1 is /dev/null for input, ours for
-/// outputs. The child has no blocked signals. Returns 0 or an error number.
+/// Starts `settings.program` with these descriptors as standard streams. -1 means /dev/null for
+/// input, and our own stream for outputs. The child starts with no signals blocked. Returns 0 or an
+/// error number.
 int spawn(const ChildSettings& settings, int input, int output, int errors, pid_t& pid) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -117,7 +118,7 @@ ChildProcess::ChildProcess(const ChildSettings& settings) {
     output_ = memory_file();
   }
   const Descriptor text = settings.input ? memory_file(*settings.input) : Descriptor();
-  // By default our standard output contains only our data.
+  // By default the child does not write to our standard output, which is reserved for our data.
   const int output = settings.show_output ? -1
                      : output_.is_open()  ? output_.number()
                                           : STDERR_FILENO;
@@ -153,7 +154,7 @@ bool ChildProcess::has_ended(bool waits) {
 }
 
 void ChildProcess::send(int signal) {
-  // Only this function reaps the child, so the number cannot belong to another process.
+  // Only this function reaps the child, so its process number cannot belong to another process yet.
   if (is_running()) {
     kill(pid_, signal);
   }

@@ -14,7 +14,7 @@
 
 namespace oblique::client {
 
-/// A process could not be started or ended unexpectedly.
+/// A process could not be started, or it ended unexpectedly.
 class ProcessError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -28,7 +28,7 @@ class ProgramNotFound : public ProcessError {
 
 using protocol::Descriptor;
 
-/// A pipe. Children inherit an end only if it is handed to them.
+/// A pipe. A child process inherits an end only as `handed_over`.
 struct Pipe {
   Pipe();  ///< Throws ProcessError.
   Descriptor read;
@@ -36,64 +36,64 @@ struct Pipe {
 };
 
 struct ChildSettings {
-  std::filesystem::path program;       ///< a name without a slash is searched in PATH
-  std::vector<std::string> arguments;  ///< without the program's name
-  bool show_errors = false;            ///< true: standard error goes to ours; false: it is kept
+  std::filesystem::path program;       ///< a name without a slash is searched for in PATH
+  std::vector<std::string> arguments;  ///< arguments after the program's name
+  bool show_errors = false;            ///< shows standard error on ours; otherwise keeps it
   int handed_over = -1;                ///< descriptor that becomes the child's kHandedOver
-  bool keep_output = false;            ///< keeps standard output separately; else with standard
-                                       ///< error
-  std::string hidden_variables{};      ///< hides variables with this prefix; empty: none
-  std::optional<std::string> input{};  ///< text for standard input; none: empty input
-  bool stays_in_our_group = false;     ///< stays in our process group and receives its signals
-  int input_from = -1;                 ///< descriptor that becomes its standard input
-  bool show_output = false;            ///< standard output goes to ours
+  bool keep_output = false;            ///< keeps standard output apart from standard error
+  std::string hidden_variables{};      ///< prefix of environment variables to hide; empty: none
+  std::optional<std::string> input{};  ///< text for standard input; nothing: empty input
+  bool stays_in_our_group = false;     ///< the child receives our group's signals
+  int input_from = -1;                 ///< descriptor that becomes the child's standard input
+  bool show_output = false;            ///< the child writes to our standard output
 };
 
-/// A child process, killed and reaped by the destructor. By default it has its own process group,
-/// so that Ctrl-C on the terminal reaches only us and we end the child in order.
+/// A child process, killed and reaped by the destructor. By default it has its own process group:
+/// Ctrl-C on the terminal then reaches only our process, which ends the child in order.
 class ChildProcess {
  public:
-  /// Number of the handed-over descriptor in the child.
+  /// Number that the descriptor `ChildSettings::handed_over` has in the child.
   static constexpr int kHandedOver = 3;
 
-  /// Throws ProcessError with the program's name.
+  /// Throws ProcessError, which names the program, if it cannot be started.
   explicit ChildProcess(const ChildSettings& settings);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  /// Whether it still runs. Reaps it if it has ended.
+  /// Whether the process still runs. Reaps it if it has ended.
   bool is_running() { return !has_ended(false); }
   void wait() { has_ended(true); }
-  /// Sends a signal unless it has ended.
+  /// Sends a signal unless the process has ended.
   void send(int signal);
   pid_t pid() const { return pid_; }
 
-  /// Whether it ended with exit code 0.
+  /// Whether the process ended with exit code 0.
   bool succeeded() const;
-  /// How it ended: "ended with exit code 1" or "was killed by signal 9 (Killed)".
+  /// Describes the end: "ended with exit code 1" or "was killed by signal 9 (Killed)".
   std::string ending() const;
-  /// The last lines of its standard error, if kept.
+  /// Returns the last lines of the child's standard error, if kept.
   std::string last_output() const;
-  /// Its standard output, if kept. Throws ProcessError if it is longer than `most_bytes`.
+  /// Returns the child's standard output, if kept. Throws ProcessError if it exceeds `most_bytes`.
   std::string output(std::size_t most_bytes) const;
 
  private:
   bool has_ended(bool waits);
 
   pid_t pid_ = -1;
-  std::optional<int> status_;  ///< status of waitpid; none while it runs
-  Descriptor errors_;          ///< memory file with its standard error
-  Descriptor output_;          ///< memory file with its standard output
+  std::optional<int> status_;  ///< status from waitpid; nothing while the child runs
+  Descriptor errors_;          ///< in-memory file with the child's standard error
+  Descriptor output_;          ///< in-memory file with the child's standard output
 };
 
 /// Runs a program to its end and returns its standard output, at most 16 MiB. Throws ProcessError,
-/// with the last lines of standard error, if the program cannot be started or fails. `keep_waiting`
-/// is called many times a second; when it returns false the program is killed and ProcessError
-/// thrown.
+/// with the last lines of standard error, if the program cannot be started or fails. Calls
+/// `keep_waiting` many times a second; if it returns false, kills the program and throws
+/// ProcessError.
 std::string output_of(ChildSettings settings, const std::function<bool()>& keep_waiting = {});
 
-/// The program `name` in the folder of our own. Throws ProcessError if it does not exist.
+/// Returns the path of the program `name` in the folder that contains our own program. Throws
+/// ProcessError if it does not exist.
 std::filesystem::path sibling_program(const std::string& name);
 
 }  // namespace oblique::client

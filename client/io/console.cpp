@@ -17,7 +17,7 @@
 namespace oblique::client {
 
 std::optional<std::string> environment_variable(const char* name) {
-  // No thread sets variables. NOLINTNEXTLINE(concurrency-mt-unsafe)
+  // getenv is safe here, because no thread sets variables. NOLINTNEXTLINE(concurrency-mt-unsafe)
   const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe)
   return value == nullptr ? std::nullopt : std::optional<std::string>(value);
 }
@@ -41,7 +41,8 @@ bool may_colour(int descriptor) {
 
 std::size_t width_of(std::string_view text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char byte) {
-    return (static_cast<unsigned char>(byte) & 0xc0U) != 0x80U;  // first byte of a character
+    // True for the first byte of a character.
+    return (static_cast<unsigned char>(byte) & 0xc0U) != 0x80U;
   }));
 }
 

@@ -15,82 +15,81 @@ namespace oblique::client {
 std::optional<std::string> environment_variable(const char* name);
 
 struct TerminalSize {
-  std::size_t columns = 0;  ///< 0: not a terminal
-  std::size_t lines = 0;    ///< 0: not a terminal
+  std::size_t columns = 0;  ///< 0 if the output is not a terminal
+  std::size_t lines = 0;    ///< 0 if the output is not a terminal
 };
-/// Size of the terminal behind a descriptor; 80 x 24 if the terminal does not report it.
+/// Returns the size of the terminal behind a descriptor; 80 x 24 if it does not report its size.
 TerminalSize terminal_size(int descriptor);
 
-/// Whether the descriptor is a terminal that has colours by TERM, and NO_COLOR is not set.
+/// Whether the descriptor is a terminal with colours according to TERM, and NO_COLOR is not set.
 bool may_colour(int descriptor);
 
-/// Number of characters of a UTF-8 text.
+/// Returns the number of characters in a UTF-8 text.
 std::size_t width_of(std::string_view text);
 /// Breaks a text between words into lines of at most `width` characters; longer words are not
 /// broken. Returns at least one line.
 std::vector<std::string> wrapped(std::string_view text, std::size_t width);
 
-// ---- Numbers for people; programs get all digits in SI units ----
+// ---- Numbers formatted for people. Programs get all digits, in SI units. ----
 
-/// A duration: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 04 h".
+/// Formats a duration: "0.4 s", "12 s", "3 min 05 s", "2 h 10 min", "3 d 04 h".
 std::string format_duration(double seconds);
 
-/// A count: "950", "14,300".
+/// Formats a count: "950", "14,300".
 std::string format_count(std::uint64_t count);
-/// A count with its noun: "1 point", "14,300 points".
+/// Formats a count with its noun: "1 point", "14,300 points".
 std::string counted(std::uint64_t count, std::string_view one, std::string_view many);
 
-/// A rate with three digits, or as a whole number from 100: "0.31", "84.4", "14,300".
+/// Formats a rate with three digits; from 100 on as a whole number: "0.31", "84.4", "14,300".
 std::string format_rate(double per_s);
 
-/// A size: "120 bytes", "1.3 MB", "24 GB"; 1 kB is 1000 bytes.
+/// Formats a size: "120 bytes", "1.3 MB", "24 GB"; 1 kB is 1000 bytes.
 std::string format_bytes(std::uint64_t bytes);
 
 enum class Verbosity {
   kQuiet,   ///< data and errors
-  kNormal,  ///< also progress and notes
-  kVerbose  ///< also what is done, where, and how long it takes
+  kNormal,  ///< data, errors, progress and notes
+  kVerbose  ///< everything, with actions, places and durations
 };
 
-/// Output streams of a command, its verbosity, and the terminal of its error stream.
+/// Output streams of a command, its verbosity, and the terminal behind the error stream.
 class Console {
  public:
-  /// Abilities of the terminal behind the error stream; by default those of a file.
+  /// Features of the terminal behind the error stream; the defaults are those of a file.
   struct Terminal {
     bool is_terminal = false;  ///< a line can be overwritten
     bool has_colours = false;
     std::function<std::size_t()> columns = [] { return std::size_t{80}; };  ///< may change
   };
 
-  /// The streams must outlive the console.
+  /// Both streams must outlive the console.
   Console(std::ostream& out, std::ostream& err, Terminal terminal)
       : out_(out), err_(err), terminal_(std::move(terminal)) {}
   Console(std::ostream& out, std::ostream& err) : Console(out, err, Terminal()) {}
-  /// The streams and terminal of this process.
+  /// Returns a console with the standard streams and terminal of this process.
   static Console of_process();
 
   void set_verbosity(Verbosity verbosity) { verbosity_ = verbosity; }
 
   std::ostream& out() { return out_; }
-  /// Errors; written at every verbosity.
+  /// Stream for errors, which are written at every verbosity.
   std::ostream& errors() { return err_; }
-  /// Progress and notes; a stream that drops everything with kQuiet.
+  /// Stream for progress and notes; with kQuiet it discards everything.
   std::ostream& notes() { return verbosity_ == Verbosity::kQuiet ? dropped_ : err_; }
 
-  /// Writes a line to `notes` with control characters made visible (proto/text.h).
+  /// Writes a line to `notes`; makes control characters visible (proto/text.h).
   void note(std::string_view sentence);
-  /// Prints a note, but only with kVerbose.
+  /// Writes a note if the verbosity is kVerbose.
   void detail(std::string_view sentence);
-  /// Writes an error as "oblique query: message"; the message may have several lines.
+  /// Writes an error as "oblique query: message". The message may have several lines.
   void error(std::string_view command, std::string_view message);
 
   /// Whether a line of `notes` can be overwritten.
   bool can_redraw() const { return terminal_.is_terminal; }
-  /// Overwrites the last redrawn line of `notes` with `line`; an empty line erases it. No effect
-  /// without a terminal.
+  /// Overwrites the last redrawn line of `notes`; an empty line erases it. Only on a terminal.
   void redraw(std::string_view line);
-  /// Maximum length of a redrawn line. The last column stays free, because some terminals wrap
-  /// there.
+  /// Maximum length of a redrawn line. It leaves the last column free, because some terminals wrap
+  /// a line that reaches it.
   std::size_t columns() const;
 
  private:

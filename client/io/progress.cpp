@@ -19,12 +19,12 @@ double completed_part(const ProgressState& state) {
              : static_cast<double>(state.completed) / static_cast<double>(state.points);
 }
 
-/// Rounded down: an unfinished study never shows 100 %.
+/// Percentage of completed points, rounded down so that an unfinished study never shows 100 %.
 int percent(const ProgressState& state) {
   return state.points == 0 ? 100 : static_cast<int>(state.completed * 100 / state.points);
 }
 
-/// ", 3.1 points/s, 2 s left"; the time only of an unfinished study.
+/// Returns ", 3.1 points/s, 2 s left". The time left is omitted once the study is finished.
 std::string rate_and_time_left(const ProgressState& state) {
   if (!state.points_per_s) {
     return {};
@@ -73,8 +73,7 @@ std::string progress_line(const ProgressState& state) {
 }
 
 void Progress::update(ProgressState state) {
-  // Window of the rate: long enough to be steady, short enough to follow workers that join and
-  // leave.
+  // The rate is averaged over this time: steady, but following workers that come and go.
   constexpr double kWindow_s = 10.0;
   const double now_s = state.elapsed_s;
   window_.emplace_back(now_s, state.completed);
@@ -94,7 +93,8 @@ void Progress::update(ProgressState state) {
   } else {
     console_.notes() << progress_line(*last_) << std::endl;
   }
-  next_s_ = now_s + (console_.can_redraw() ? 0.1 : 10.0);  // interval of bars and of lines
+  // Time between drawings of the bar, or between lines.
+  next_s_ = now_s + (console_.can_redraw() ? 0.1 : 10.0);
 }
 
 void Progress::finish() {
@@ -112,7 +112,7 @@ StatusLine::StatusLine(Console& console, Settings settings)
 }
 
 StatusLine::~StatusLine() {
-  drawer_ = std::jthread();  // stops and joins
+  drawer_ = std::jthread();  // stops the thread and waits for its end
   erase();
 }
 

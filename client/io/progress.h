@@ -22,29 +22,28 @@ namespace oblique::client {
 struct ProgressState {
   std::string study;
   std::uint64_t points = 0;
-  std::uint64_t completed = 0;  ///< solved, failed or left out by a filter
+  std::uint64_t completed = 0;  ///< points that are solved, failed or filtered out
   std::uint64_t failed = 0;
   std::uint64_t left_out = 0;
-  double elapsed_s = 0.0;                   ///< since watching began
+  double elapsed_s = 0.0;                   ///< time since watching began
   std::optional<double> points_per_s = {};  ///< unknown until a point is completed
 };
 
-/// "study [####----] 5/10 50 %, 3.1 points/s, 2 s left" in at most `columns` characters. First the
-/// bar is shortened, then the name.
+/// Returns "study [####----] 5/10 50 %, 3.1 points/s, 2 s left" in at most `columns` characters. To
+/// fit, it first shortens the bar, then the name.
 std::string progress_bar(const ProgressState& state, std::size_t columns = 1000);
 
-/// "study: 5 of 10 points (50 %), 3.1 points/s, 2 s left", for logs.
+/// Returns "study: 5 of 10 points (50 %), 3.1 points/s, 2 s left", a line for logs.
 std::string progress_line(const ProgressState& state);
 
-/// Draws the progress of one study on the console: a bar that is overwritten on a terminal, else a
-/// line every ten seconds. The caller supplies the time.
+/// Shows the progress of one study on the console. On a terminal it redraws a bar; otherwise it
+/// prints a line every ten seconds. The caller supplies the time.
 class Progress {
  public:
   explicit Progress(Console& console)
       : console_(console), next_s_(console.can_redraw() ? 0.0 : 2.0) {}
 
-  /// Draws the state, at most ten times a second. `elapsed_s` must not decrease. Fills in the rate
-  /// of the last seconds.
+  /// Draws the state and rate, at most ten times a second. `elapsed_s` must not decrease.
   void update(ProgressState state);
 
   /// Draws the last state once more and ends the line.
@@ -54,36 +53,36 @@ class Progress {
   Console& console_;
   std::optional<ProgressState> last_;
   std::deque<std::pair<double, std::uint64_t>> window_;  ///< recent (elapsed_s, completed)
-  double next_s_;                                        ///< time of the next drawing
+  double next_s_;                                        ///< elapsed time at which to draw next
 };
 
-/// Shows what a long computation does on one line of the terminal, which is overwritten and finally
-/// erased. Without a terminal nothing is drawn.
+/// Shows the status of a long computation on one line of the terminal, overwrites it with each
+/// change, and erases it at the end. Without a terminal it shows nothing.
 class StatusLine {
  public:
-  /// Returns the text of a part. Called from another thread while the part is active.
+  /// Returns the text that describes a part. It is called on another thread.
   using Describe = std::function<std::string()>;
 
   struct Settings {
-    bool is_shown = true;                    ///< false: the terminal is used for other output
-    std::chrono::milliseconds first{1000};   ///< shorter computations show nothing
+    bool is_shown = true;                    ///< false if the terminal is used for other output
+    std::chrono::milliseconds first{1000};   ///< delay before the line appears
     std::chrono::milliseconds between{200};  ///< interval of drawings
   };
 
-  /// `console` must outlive it; nothing else may write notes while a part is active.
+  /// `console` must outlive this object. While a part is active, nothing else may write notes.
   explicit StatusLine(Console& console, Settings settings);
   explicit StatusLine(Console& console) : StatusLine(console, Settings()) {}
   ~StatusLine();
   StatusLine(const StatusLine&) = delete;
   StatusLine& operator=(const StatusLine&) = delete;
 
-  /// A part of the computation, active until the last copy of this is destroyed.
+  /// A part of the computation. It is active until the last copy of this pointer is destroyed.
   using Part = std::shared_ptr<void>;
-  /// Begins a part; parts are shown in the order of their beginning. From any thread.
+  /// Begins a part. The line shows parts in the order in which they began. Thread-safe.
   [[nodiscard]] Part begin(Describe describe);
   [[nodiscard]] Part begin(std::string what);
 
-  /// Writes a line that is not overwritten. From any thread.
+  /// Writes a permanent line above the status line. Thread-safe.
   void print(const std::string& line);
 
  private:
@@ -99,7 +98,7 @@ class StatusLine {
   std::list<Describe> parts_;
   bool is_drawn_ = false;
   std::condition_variable_any stopped_;
-  std::jthread drawer_;  ///< last, because it uses all members above
+  std::jthread drawer_;  ///< declared last: its thread uses all members above
 };
 
 }  // namespace oblique::client

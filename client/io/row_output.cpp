@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 constexpr std::array<std::string_view, 4> kFormatNames{"table", "csv", "json", "jsonl"};
 
-/// Whether a name ends in its unit, such as vt_in_m_s and impulse_n_Ns.
+/// Whether a column name ends with its unit, such as vt_in_m_s and impulse_n_Ns.
 bool ends_in_unit(const std::string& name, const std::string& unit) {
   std::string suffix = "_";
   for (const char letter : unit) {
@@ -41,7 +41,7 @@ bool ends_in_unit(const std::string& name, const std::string& unit) {
 
 constexpr const char* kName = "standard output";
 
-/// The command of the pager; empty: none.
+/// Returns the command of the pager, or an empty text for no pager.
 std::string pager_command() {
   for (const char* name : {"OBLIQUE_PAGER", "PAGER"}) {
     if (const auto command = environment_variable(name)) {
@@ -64,14 +64,15 @@ std::string name_of(int descriptor) {
   return fmt::format("/proc/self/fd/{}", descriptor);
 }
 
-/// Where bytes for `path`, which may be a link, are written.
+/// The file that receives the output for `path`, which may be a symbolic link.
 struct FilePlace {
-  std::string path;          // behind the links
-  bool is_in_place = false;  // a device, a pipe or /dev/stdout: opened and written directly
+  std::string path;  // path after following the links
+  // True for devices, pipes and /dev/stdout, which are opened and written directly.
+  bool is_in_place = false;
 };
 
 FilePlace file_place(const std::string& path, std::string_view flag) {
-  constexpr int kMaxLinks = 40;  // Linux's own limit
+  constexpr int kMaxLinks = 40;  // Linux follows as many links
   FilePlace place{path};
   std::error_code ignored;
   for (int links = 0; fs::is_symlink(fs::symlink_status(place.path, ignored)); ++links) {
@@ -79,8 +80,7 @@ FilePlace file_place(const std::string& path, std::string_view flag) {
       refuse(flag, path, ELOOP);
     }
     const fs::path link = fs::absolute(place.path);
-    // Links in /proc, such as the target of /dev/stdout, lead to an open file; its name is
-    // irrelevant.
+    // Links in /proc, as behind /dev/stdout, refer to open files, whose names do not matter.
     if (fs::weakly_canonical(link.parent_path(), ignored).string().starts_with("/proc/")) {
       place.is_in_place = true;
       return place;
@@ -260,7 +260,7 @@ void StandardOutput::start_pager() {
   Pipe pipe;
   pager_ = std::make_unique<ChildProcess>(ChildSettings{
       .program = "sh",
-      // If the pager is not installed, the text is printed without one.
+      // If the pager is not installed, `cat` prints the text instead.
       .arguments = {"-c", "command -v ${0%% *} >/dev/null 2>&1 || exec cat; eval \"$0\"",
                     pager_command_},
       .show_errors = true,
@@ -268,7 +268,8 @@ void StandardOutput::start_pager() {
       .input_from = pipe.read.number(),
       .show_output = true});
   to_pager_ = std::move(pipe.write);
-  // Writing fails once the user has left the pager. Ctrl-C goes to the pager.
+  // Writing fails once the user has quit the pager; without SIGPIPE this is an error code. Ctrl-C
+  // goes to the pager.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGINT, SIG_IGN);
 }
@@ -295,7 +296,7 @@ AtomicFile::AtomicFile(const std::string& path, std::string_view flag) : name_(p
   path_ = place.path;
   is_in_place_ = place.is_in_place;
   if (is_in_place_) {
-    // A file behind /dev/stdout keeps its contents.
+    // /dev/stdout may be a file, so output is appended to its contents.
     descriptor_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC));
   } else {
     open_draft();
@@ -305,13 +306,13 @@ AtomicFile::AtomicFile(const std::string& path, std::string_view flag) : name_(p
   }
 }
 
-/// Without a name where possible: nothing is left if the program ends.
+/// Opens an unnamed file where possible, so that nothing remains if the program ends early.
 void AtomicFile::open_draft() {
   draft_ = fmt::format("{}.part-{}", path_, ::getpid());
   descriptor_ = Descriptor(
       ::open(fs::absolute(path_).parent_path().c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666));
   if (descriptor_.is_open() && ::access(name_of(descriptor_.number()).c_str(), F_OK) != 0) {
-    descriptor_.close();  // naming it later needs /proc
+    descriptor_.close();  // the file can be named later only through /proc
     errno = EOPNOTSUPP;
   }
   if (!descriptor_.is_open() && (errno == EOPNOTSUPP || errno == EISDIR || errno == EINVAL)) {
@@ -341,7 +342,7 @@ void AtomicFile::finish() {
     require(::close(descriptor_.release()) == 0);
     return;
   }
-  // Some file systems report a full disk only here.
+  // Some file systems report a full disk only at fsync.
   require(::fsync(descriptor_.number()) == 0);
   if (!has_name_) {
     require(::linkat(AT_FDCWD, name_of(descriptor_.number()).c_str(), AT_FDCWD, draft_.c_str(),

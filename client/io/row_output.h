@@ -16,8 +16,7 @@
 
 namespace oblique::client {
 
-/// The reader of the output has closed it, for example `head`. This is no failure and needs no
-/// message.
+/// The reader of the output, for example `head`, has closed it. This is no failure.
 class ClosedPipe : public std::runtime_error {
  public:
   ClosedPipe() : std::runtime_error("the reader of the output has ended") {}
@@ -32,17 +31,18 @@ class Sink {
 
   /// Throws ClosedPipe, or std::runtime_error with the reason.
   virtual void append(std::string_view bytes) = 0;
-  /// Ends the output. Throws as `append` does.
+  /// Ends the output. Throws the same errors as `append`.
   virtual void finish() {}
 };
 
-/// Writes all bytes to a descriptor; errors call it `name`. Throws as Sink::append does.
+/// Writes all bytes to a descriptor that error messages call `name`. Throws the same errors as
+/// Sink::append.
 void write_all(int descriptor, std::string_view bytes, const std::string& name);
 
-/// Standard output, written after the contents of std::cout. On a terminal control characters are
+/// Standard output, written after the contents of std::cout. On a terminal, control characters are
 /// made visible (proto/text.h). With `may_page`, text longer than the screen goes through a pager:
-/// $OBLIQUE_PAGER, else $PAGER, else `less -FRSX`; an empty value or `cat` means none. `finish` and
-/// the destructor wait until the user leaves the pager; Ctrl-C goes to the pager meanwhile.
+/// $OBLIQUE_PAGER, else $PAGER, else `less -FRSX`; an empty value or `cat` means no pager. `finish`
+/// and the destructor wait until the user quits the pager; until then Ctrl-C goes to the pager.
 class StandardOutput : public Sink {
  public:
   explicit StandardOutput(bool may_page = false);
@@ -58,21 +58,22 @@ class StandardOutput : public Sink {
 
   bool is_terminal_;
   std::string pager_command_;  // empty: no pager
-  std::string first_screen_;   // held back until it exceeds the screen
+  std::string first_screen_;   // text held back until it exceeds the screen
   std::unique_ptr<ChildProcess> pager_;
   Descriptor to_pager_;
 };
 
 /// Whether output to `path` is written directly, because it is a device, a pipe or /dev/stdout.
-/// Throws solver::InputError for a folder and for links that form a circle.
+/// Throws solver::InputError for a folder and for circular links.
 bool is_written_in_place(const std::string& path);
 
 /// A file that is written atomically: it appears under its name when finished; until then the
-/// previous file stays. An unfinished file leaves nothing behind on file systems with unnamed files
-/// (not NFS). A link stays and its target is replaced. Devices and pipes are written directly.
+/// previous file remains. An unfinished file leaves nothing behind, except on file systems without
+/// unnamed files (NFS). A symbolic link is kept and its target replaced. Devices and pipes are
+/// written directly.
 class AtomicFile : public Sink {
  public:
-  /// Throws solver::InputError with the name of the flag if the file cannot be created.
+  /// Throws solver::InputError, which names the flag, if the file cannot be created.
   explicit AtomicFile(const std::string& path, std::string_view flag = "--out");
   ~AtomicFile() override;
 
@@ -82,96 +83,95 @@ class AtomicFile : public Sink {
  private:
   void open_draft();
 
-  std::string name_;  // named in errors
-  std::string path_;  // target of the links
+  std::string name_;  // name in error messages
+  std::string path_;  // path after following symbolic links
   bool is_in_place_ = false;
-  std::string draft_;      // temporary name beside the file
-  bool has_name_ = false;  // the file is visible under its temporary name
+  std::string draft_;      // path of the temporary file, in the same folder
+  bool has_name_ = false;  // the temporary file is visible under its name
   Descriptor descriptor_;
 };
 
-/// Tables are for reading: numbers have six digits and are aligned at the point. CSV (RFC 4180,
-/// with a header line), JSON (an array of objects) and JSON lines (an object per line) contain
-/// every number as the shortest text that reads back as the same bits; NULL is an empty field or
-/// null. In JSON the second of two columns of one name is called name_2, and lists stored as text
-/// become arrays.
+/// Output formats. Tables are for people: numbers have six digits and are aligned at the decimal
+/// point. CSV (RFC 4180, with a header line), JSON (an array of objects) and JSON lines (an object
+/// per line) are for programs: each number is the shortest text that reads back as the same bits;
+/// NULL is an empty field or null. In JSON, if two columns have the same name, the second is called
+/// name_2, and lists stored as text become arrays.
 enum class Format { kTable, kCsv, kJson, kJsonLines };
 
-/// `table`, `csv`, `json` and `jsonl`.
+/// Returns `table`, `csv`, `json` and `jsonl`.
 std::span<const std::string_view> format_names();
-/// Index of `name` in `allowed`. Throws solver::InputError with the flag and the nearest name if it
-/// is not there.
+/// Returns the index of `name` in `allowed`. Throws solver::InputError, with the flag and the
+/// nearest allowed name, if there is none.
 std::size_t choice_of(std::string_view flag, std::string_view name,
                       std::span<const std::string_view> allowed);
-/// The format called `name`. Throws solver::InputError if it is not in `allowed`.
+/// Returns the format called `name`. Throws solver::InputError if it is not in `allowed`.
 Format format_named(std::string_view name,
                     std::span<const std::string_view> allowed = format_names());
 
-/// The format of --format or, if that is empty, of the ending of `file`, such as .csv; `usual` for
-/// standard output (`file` empty) and files that are written directly. Throws solver::InputError
-/// for other names and endings, and if the two contradict each other.
+/// Returns the format that --format names. Without --format, the ending of `file`, such as .csv,
+/// gives the format; standard output (`file` is empty) and files that are written directly have the
+/// format `usual`. Throws solver::InputError for other names and endings, and if the flag
+/// contradicts the ending.
 Format format_of_output(const std::string& flag, const std::string& file,
                         std::span<const std::string_view> allowed = format_names(),
                         Format usual = Format::kTable);
 
-/// Meaning of the letters in modes.
+/// Explains the letters of modes.
 inline constexpr const char* kModeLetters = "S stick, s slip; C compression, R restitution";
 
 struct ShownColumn {
-  std::string heading;    ///< name, with the unit in brackets if it is not the SI unit
-  double per_unit = 1.0;  ///< shown value of 1 in SI units
+  std::string heading;    ///< name, with the unit in brackets unless it is the SI unit
+  double per_unit = 1.0;  ///< factor from SI units to shown units
 };
-/// How tables show a column with SI unit `unit` (empty: none or unknown). Small values are shown in
-/// the units of the report of `solve`, such as microseconds.
+/// Returns how tables show a column with SI unit `unit` (empty: none or unknown). Small values have
+/// the units of the report that `solve` prints, such as microseconds.
 ShownColumn shown_column(const std::string& name, const std::string& unit = {});
-/// How tables show all columns of an answer.
+/// Returns how tables show the columns of an answer.
 std::vector<ShownColumn> shown_columns(const protocol::QueryReply& chunk);
 
 struct OutputSettings {
   Format format = Format::kTable;
   std::string file = {};  ///< empty: standard output
-  bool may_page = true;   ///< a long table on a terminal goes through a pager
-  /// True: columns of a table that do not fit the terminal are left out; false: the last column is
-  /// wrapped.
+  bool may_page = true;   ///< long tables on a terminal may go through a pager
+  /// True: a table omits columns that do not fit the terminal. False: it wraps the last column.
   bool may_leave_out = true;
-  std::string way_to_all = "csv and json have all";  ///< how to see the columns that were left out
-  std::vector<ShownColumn> shown = {};  ///< for tables; later columns have their names as headings
-  std::size_t width = 0;                ///< longest line of a table in characters; 0: no limit
-  std::size_t first_rows = 1000;        ///< rows of a table that determine the widths of columns
+  std::string way_to_all = "csv and json have all";  ///< advice on how to see omitted columns
+  /// For tables; further columns have their names as headings.
+  std::vector<ShownColumn> shown = {};
+  std::size_t width = 0;          ///< maximum length of a table line in characters; 0: no limit
+  std::size_t first_rows = 1000;  ///< the first rows of a table, which set its column widths
 };
 
-/// Formats the rows of one answer as they arrive, in constant memory.
+/// Formats the rows of one answer as they arrive. Needs constant memory.
 class RowPrinter {
  public:
   virtual ~RowPrinter() = default;
-  /// Appends the rows of a valid chunk (proto/wire). The first chunk, which may be empty, names the
-  /// columns.
+  /// Appends the rows of a valid chunk (proto/wire) to `out`. The first chunk, which may have no
+  /// rows, names the columns.
   virtual void print(const protocol::QueryReply& chunk, std::string& out) = 0;
-  /// Appends what follows the last row.
+  /// Appends the text after the last row to `out`.
   virtual void end(std::string& out) = 0;
 };
 std::unique_ptr<RowPrinter> make_printer(const OutputSettings& settings);
 
-/// A whole answer as text; uses the settings of `make_printer`.
+/// Formats a whole answer as text; the settings are those of `make_printer`.
 std::string text_of(const std::vector<protocol::QueryReply>& chunks,
                     const OutputSettings& settings);
 
 /// Writes the rows of an answer to standard output, a pager (on a terminal) or a file (AtomicFile).
-/// For rows that are computed here: write them into a protocol::ChunkWriter, `print` its chunks,
-/// and `finish`.
+/// A caller that computes rows itself writes them into a protocol::ChunkWriter, passes its chunks
+/// to `print`, and calls `finish`.
 class RowOutput {
  public:
-  /// On a terminal sets `width` and `first_rows`. Throws solver::InputError if the file cannot be
-  /// created.
+  /// Sets `width` and `first_rows` for a terminal. Throws InputError if the file cannot be created.
   explicit RowOutput(OutputSettings settings);
 
-  /// Throws ClosedPipe when the reader has closed the output, std::runtime_error for a failed
-  /// write.
+  /// Throws ClosedPipe if the reader closed the output, std::runtime_error if writing fails.
   void print(const protocol::QueryReply& chunk);
-  /// Ends the output. Throws as `print` does. Without it no file appears.
+  /// Ends the output. A file appears only after this call. Throws the same errors as `print`.
   void finish();
 
-  /// Whether the output goes through a pager, which the user may leave at any time.
+  /// Whether the output goes through a pager, which the user may quit at any time.
   bool is_paged() const;
 
  private:
@@ -180,17 +180,15 @@ class RowOutput {
 };
 
 void print(std::ostream& out, const protocol::Table& rows, Format format);
-/// Prints a whole table to standard output. In tables, and on a terminal, control characters are
-/// made visible (proto/text.h); in JSON they are escaped; CSV in a file or pipe contains texts
-/// unchanged.
+/// Prints a whole table to standard output. Control characters are made visible (proto/text.h) in
+/// tables and on a terminal, and escaped in JSON; CSV in a file or pipe contains texts unchanged.
 void print_out(const protocol::Table& rows, Format format);
 
 /// Appends a number as the shortest text that reads back as the same bits.
 void append_number(std::string& out, double value);
 void append_number(std::string& out, std::int64_t value);
 
-/// Appends a field of CSV, quoted if necessary (RFC 4180). An empty text is quoted, too, because an
-/// empty field means NULL.
+/// Appends a field of CSV. Quotes it if necessary (RFC 4180) and if it is empty: `""` is not NULL.
 void append_csv_field(std::string& out, std::string_view text);
 
 }  // namespace oblique::client

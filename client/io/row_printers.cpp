@@ -1,4 +1,4 @@
-// Rows as CSV, JSON, JSON lines and tables.
+// Formats rows as CSV, JSON, JSON lines and tables.
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -64,12 +64,12 @@ class CsvPrinter : public RowPrinter {
   bool has_header_ = false;
 };
 
-/// A list that a column stores as JSON text.
+/// Describes a list that a column stores as JSON text.
 struct PackedList {
-  std::span<const std::string_view> members;  // names of the members of an element; empty: none
+  std::span<const std::string_view> members;  // names of the members of each element; empty: none
 };
 
-/// The list that a column stores; nothing if it stores none.
+/// Returns the list that a column stores, or nothing if it stores no list.
 std::optional<PackedList> packed_list(std::string_view column) {
   const auto* list = solver::find_result_list(column);
   bool is_part = false;
@@ -85,8 +85,8 @@ std::optional<PackedList> packed_list(std::string_view column) {
   return column == "lengths_m" ? std::optional(PackedList{}) : std::nullopt;
 }
 
-/// The elements of a list; elements with named members become objects, as in `solve --json`.
-/// Nothing if the text is no list of plain values or of lists of them.
+/// Parses a list. Elements with named members become objects, as in `solve --json`. Returns nothing
+/// if the text is not a list of plain values or of lists of plain values.
 std::optional<ordered_json> unpacked(const PackedList& packed, std::string_view text) {
   auto list = ordered_json::parse(text.begin(), text.end(), nullptr, false);
   if (!list.is_array()) {
@@ -113,7 +113,8 @@ std::optional<ordered_json> unpacked(const PackedList& packed, std::string_view 
   return std::optional<ordered_json>(std::in_place, std::move(list));
 }
 
-/// Escapes characters as \u.... if a terminal would act on them; invalid UTF-8 becomes U+FFFD.
+/// Appends a value as JSON. Escapes characters that would control a terminal as \u....; replaces
+/// invalid UTF-8 by U+FFFD.
 void append_json(std::string& out, const ordered_json& value, bool only_ascii) {
   out += value.dump(-1, ' ', only_ascii, ordered_json::error_handler_t::replace);
 }
@@ -127,8 +128,8 @@ void append_json_text(std::string& out, std::string_view text) {
   }
 }
 
-/// A finite number with a point or exponent, so that JSON readers parse a real number: 7.0. Else
-/// `null`.
+/// Appends a finite number with a point or exponent, such as 7.0, so that JSON readers parse it as
+/// a real number; appends `null` for other numbers.
 void append_json_real(std::string& out, double value) {
   if (!std::isfinite(value)) {
     out += "null";
@@ -141,7 +142,7 @@ void append_json_real(std::string& out, double value) {
   }
 }
 
-/// Column names; of equal names the second becomes name_2, and so on.
+/// Returns the column names, each once: of equal names the second becomes name_2, and so on.
 std::vector<std::string> distinct_names(const protocol::QueryReply& chunk) {
   std::vector<std::string> names;
   const auto contains = [](const auto& list, const std::string& name) {
@@ -187,7 +188,7 @@ class JsonPrinter : public RowPrinter {
 
  private:
   struct Key {
-    std::string text;  // before each value: ,"name":
+    std::string text;  // text before each value, such as ,"name":
     std::optional<PackedList> packed;
   };
 
@@ -223,13 +224,13 @@ class JsonPrinter : public RowPrinter {
 };
 
 constexpr std::size_t kGap = 2;     // between columns
-constexpr const char* kMore = "…";  // ends the heading if columns are left out
-/// Texts are not shortened below this length.
+constexpr const char* kMore = "…";  // ends the heading if columns are omitted
+/// Texts are never shortened below this length.
 constexpr std::size_t kShortestText = 12;
-/// Sentences are not wrapped below this width.
+/// Sentences are never wrapped below this width.
 constexpr std::size_t kNarrowestSentence = 16;
 
-/// A value on one line: six digits; NULL is a dash.
+/// Formats a value for a table: on one line, numbers with six digits, NULL as a dash.
 std::string table_cell(const Cell& cell, double per_unit) {
   switch (cell.kind) {
     case CellKind::kInteger:
@@ -248,12 +249,12 @@ std::string table_cell(const Cell& cell, double per_unit) {
   return "-";
 }
 
-/// Number of characters before the point; all if there is none.
+/// Number of characters before the decimal point; all characters if there is no point.
 std::size_t before_point(std::string_view number) {
   return std::min(number.find('.'), number.size());
 }
 
-/// The first `width` characters; if more follow, the last is an ellipsis.
+/// Returns at most the first `width` characters; the last is an ellipsis if the text is longer.
 std::string shortened_to(const std::string& text, std::size_t width) {
   if (width_of(text) <= width) {
     return text;
@@ -266,9 +267,10 @@ std::string shortened_to(const std::string& text, std::size_t width) {
   return text.substr(0, bytes) + "…";
 }
 
-/// The first rows determine the widths of columns; a wider later value shifts the rest of its line.
-/// If lines are too long, texts are shortened first; then columns are left out from the right, and
-/// a line below the table names them. Another line explains the letters of modes.
+/// Prints a table. The first rows determine the column widths; a wider value in a later row shifts
+/// the rest of its line. If lines are too long, texts are shortened first; then columns are omitted
+/// from the right, and a line below the table names them. Another line explains the letters of
+/// modes.
 class TablePrinter : public RowPrinter {
  public:
   explicit TablePrinter(OutputSettings settings) : settings_(std::move(settings)) {}
@@ -286,7 +288,7 @@ class TablePrinter : public RowPrinter {
     double per_unit = 1.0;
     std::size_t width = 0;
     std::size_t before_point = 0;  // of numbers
-    std::size_t after_point = 0;   // including the point
+    std::size_t after_point = 0;   // characters from the point on
     bool has_numbers = false;
   };
   using Line = std::vector<Value>;
@@ -306,7 +308,7 @@ class TablePrinter : public RowPrinter {
   OutputSettings settings_;
   std::vector<Column> columns_;
   std::size_t shown_ = 0;    // number of columns shown, from the left
-  std::vector<Line> first_;  // kept until the widths are known
+  std::vector<Line> first_;  // first rows, kept until the widths are known
   bool has_begun_ = false;
   bool has_head_ = false;
 };
@@ -371,7 +373,7 @@ std::size_t TablePrinter::line_width() const {
   return all;
 }
 
-/// Whether sentences of the column are wrapped.
+/// Whether the table wraps the sentences of this column.
 bool TablePrinter::wraps(const Column& column) const {
   return !settings_.may_leave_out && settings_.width > 0 && !column.has_numbers &&
          &column == &columns_.back();
@@ -383,8 +385,8 @@ std::size_t TablePrinter::least_width(const Column& column) const {
                               : std::max(kShortestText, width_of(column.heading));
 }
 
-/// Makes lines fit. Wraps sentences in the last column if all columns are kept; then shortens the
-/// widest text; then leaves out columns, except the first.
+/// Makes lines fit the width. Wraps sentences in the last column if all columns must be shown;
+/// otherwise shortens the widest texts, then omits columns from the right, but never the first.
 void TablePrinter::fit() {
   while (settings_.width > 0 && line_width() > settings_.width) {
     Column* widest = nullptr;
@@ -426,7 +428,7 @@ void TablePrinter::print_cells(const std::vector<std::string>& cells, std::strin
 
 void TablePrinter::print_line(const Line& line, std::string& out) const {
   std::vector<std::string> cells;
-  std::vector<std::string> sentence;  // further lines of the last cell
+  std::vector<std::string> sentence;  // further lines of the wrapped last cell
   for (std::size_t i = 0; i < line.size(); ++i) {
     const auto& [text, is_number] = line[i];
     const Column& column = columns_[i];

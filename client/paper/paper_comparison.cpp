@@ -52,8 +52,8 @@ PublishedCase case_of(const toml::table& table) {
           table["read"].value<std::string>().value()};
 }
 
-// Rows do not store F_n at valleys, so the turns of a ripple are unknown: only the phases up to the
-// peak before the first ripple are used.
+// Rows of the database do not contain F_n at valleys, so the turns of a ripple are unknown. Only
+// the phases up to the peak before the first ripple are used.
 CaseNumbers case_of_row(const protocol::Row& row) {
   CaseNumbers own;
   own.mode = std::get<std::string>(row[7]);
@@ -97,7 +97,7 @@ protocol::Value value_or_null(const std::optional<double>& value) {
   return value ? protocol::Value(*value) : protocol::Value();
 }
 
-// "5.058 / 5.07 / -0.24"; missing values are dashes.
+// Formats "5.058 / 5.07 / -0.24"; missing values are dashes.
 std::string beside(const std::vector<Difference>& differences, std::size_t case_index,
                    Quantity quantity, std::size_t index, int decimals) {
   const auto found =
@@ -333,7 +333,7 @@ OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows) {
 }
 
 protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences) {
-  // In the order of Quantity.
+  // Names in the order of Quantity.
   constexpr std::array<const char*, 4> kNames{"fn_peak_kN", "ft_peak_kN", "phase_ms", "stick_ms"};
   protocol::Table reply{
       .columns = {"H", "mu", "e", "quantity", "seq", "published", "ours", "difference_percent"}};

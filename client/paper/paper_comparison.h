@@ -17,11 +17,11 @@
 
 namespace oblique::client {
 
-/// Numbers of one impact in the paper's units, ripples merged.
+/// Numbers of one impact in the paper's units, with ripples merged.
 struct CaseNumbers {
   std::string mode;
   std::vector<double> fn_kN;      ///< F_n at each major peak
-  std::vector<double> ft_kN;      ///< largest |F_t| around each major peak
+  std::vector<double> ft_kN;      ///< largest |F_t| near each major peak
   std::vector<double> phases_ms;  ///< duration of each phase
   std::optional<double> stick_ms;
 };
@@ -30,13 +30,13 @@ struct PublishedCase : CaseNumbers {
   double H_m;
   double mu;
   double e_star;
-  std::string read;  ///< place in the paper
+  std::string read;  ///< place in the paper, such as a table
 
-  /// Whether the values are those of this case, up to rounding in decimal text.
+  /// Whether the given values are those of this case, up to rounding in decimal text.
   bool is_at(double H, double friction, double e) const;
 };
 
-/// A printed number that is wrong.
+/// A number that is printed wrongly in the paper.
 struct Misprint {
   std::string where;
   std::vector<std::string> printed;
@@ -48,25 +48,25 @@ struct PublishedTable {
   std::vector<Misprint> misprints;
 };
 
-/// The table client/paper/published.toml, which is compiled into the program.
+/// Returns the table client/paper/published.toml, which is compiled into the program.
 PublishedTable published_table();
 
-/// Number of peaks of F_n in the case's mode: one per compression phase.
+/// Returns the number of peaks of F_n in the case's mode: one per compression phase.
 int published_peaks(const PublishedCase& published);
 
-/// The numbers of a result that the paper publishes.
+/// Extracts from a result the numbers that the paper publishes.
 CaseNumbers own_case(const solver::CaseResult& result);
 
-/// Our numbers for each published case; nothing for a case that is not solved.
+/// Our numbers for each published case; nothing for a case without a result.
 using OwnCases = std::vector<std::optional<CaseNumbers>>;
 
 enum class Quantity { kFn, kFt, kPhase, kStick };
 
-/// A published number and ours, in the paper's unit (kN or ms).
+/// A published number and our number, in the paper's unit (kN or ms).
 struct Difference {
   std::size_t case_index;
   Quantity quantity;
-  std::size_t index;  ///< number of the peak or phase, from 0
+  std::size_t index;  ///< number of the peak or phase, counted from 0
   double published;
   std::optional<double> ours;  ///< nothing if we have no such peak, phase or case
 
@@ -74,10 +74,10 @@ struct Difference {
   std::optional<double> percent() const;
 };
 
-/// All counted published numbers and ours; `own` has one entry per case.
+/// Returns all published numbers that count, each with ours; `own` has one entry per case.
 std::vector<Difference> compare(const PublishedTable& table, const OwnCases& own);
 
-/// Root mean square and largest size of the differences [%].
+/// Root mean square and maximum size of the differences [%].
 struct DifferenceSummary {
   std::size_t counted = 0;
   std::size_t missing = 0;
@@ -87,24 +87,23 @@ struct DifferenceSummary {
 };
 DifferenceSummary summary_of(const std::vector<Difference>& differences);
 
-/// Solves the cases with each finger, in parallel; returns a list for each finger. Throws
+/// Solves the cases with each finger, in parallel; returns one list per finger. Throws
 /// solver::SolveError if a case cannot be solved.
 std::vector<OwnCases> solved_cases(const PublishedTable& table,
                                    std::span<const solver::Finger> fingers);
 
 /// Reads the cases from rows of `runs` with the columns point, H, mu, e, peaks, phases,
-/// stick_total_s and major_mode. A case without a solved point gives nothing; phases from the first
-/// ripple on are left out. Throws std::runtime_error if a case has several points.
+/// stick_total_s and major_mode. A case without a solved point is empty. Omits phases from the
+/// first ripple on. Throws std::runtime_error if a case has several points.
 OwnCases own_cases(const PublishedTable& table, const protocol::Table& rows);
 
-/// Prints the tables: forces, durations, stick times, modes with the differing ones, summary,
-/// misprints.
+/// Prints the tables: forces, durations, stick times, modes, differing modes, summary, misprints.
 void print_comparison(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
 /// Prints only peaks and modes.
 void print_modes(std::ostream& out, const PublishedTable& table, const OwnCases& own);
 
-/// The differences as rows, one per published number, for CSV and JSON.
+/// Returns the differences as rows for CSV and JSON, one per published number.
 protocol::Table rows_of(const PublishedTable& table, const std::vector<Difference>& differences);
 
 }  // namespace oblique::client

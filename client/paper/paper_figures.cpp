@@ -37,7 +37,7 @@ PaperCase solved_case(const PublishedCase& published, const solver::Finger& fing
   return one;
 }
 
-/// Linear interpolation between instants of the trace.
+/// Interpolates a column linearly between instants of the trace.
 double value_at(const PaperCase& one, double t_s, plot::Column value) {
   const auto& rows = one.history.rows;
   const auto after =
@@ -50,11 +50,11 @@ double value_at(const PaperCase& one, double t_s, plot::Column value) {
   return before.*value + share * ((*after).*value - before.*value);
 }
 
-/// Adds published numbers of a case to a curve as diamonds.
+/// Adds the published numbers of a case to a curve, which draws them as diamonds.
 using AddPublished = std::function<void(const PaperCase& one, Curve& diamonds)>;
 
-/// Adds the published peaks of F_n, or of F_t. Times are those of our peaks, because the paper
-/// gives none; a peak of F_t is at the largest |F_t| around a peak of F_n.
+/// Adds the published peaks of F_n or of F_t. Their times are those of our peaks, because the paper
+/// gives none. A peak of F_t is placed at our largest |F_t| near a peak of F_n.
 void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   const auto& published = of_ft ? one.published.ft_kN : one.published.fn_kN;
   std::size_t next = 0;
@@ -72,7 +72,7 @@ void add_peaks(bool of_ft, const PaperCase& one, Curve& diamonds) {
   }
 }
 
-/// Published ends of phases, on our curve at the end of our phase of the same number.
+/// Adds a diamond for each published end of a phase, on our curve at the end of the same phase.
 void add_phase_ends(const PaperCase& one, Curve& diamonds) {
   const CaseNumbers own = own_case(*one.history.result);
   double published_s = 0.0;
@@ -102,7 +102,7 @@ void add_if_any(Panel& panel, Curve curve) {
   }
 }
 
-/// What a panel draws for each case of a group: a column over time.
+/// Content of a panel: one column over time, for each case of a group.
 struct PanelPlan {
   std::string label;
   std::string name;
@@ -124,13 +124,13 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
     longest_s = std::max(longest_s, t_s);
   }
   add_if_any(panel, std::move(published));
-  panel.x = plot::time_axis(1.03 * longest_s);  // include marks at the end
+  panel.x = plot::time_axis(1.03 * longest_s);  // the margin includes marks at the end
   panel.y = {.label = plan.label, .name = plan.name, .per_unit = plan.per_unit};
   plot::fit(panel.y, panel.curves, &Curve::y);
   return panel;
 }
 
-/// A figure with a column of panels for each group, two groups per row, lettered as in the paper.
+/// Creates a figure: a column of panels per group, two groups per row, lettered as in the paper.
 Figure over_time(const PaperGroups& groups, const std::string& title, const std::string& subtitle,
                  double panel_height, const std::vector<PanelPlan>& plans) {
   Figure figure{
@@ -153,7 +153,7 @@ Figure over_time(const PaperGroups& groups, const std::string& title, const std:
   return figure;
 }
 
-/// The hysteresis loops for all e* in one panel.
+/// Creates one panel with the hysteresis loops for all e*.
 Figure hysteresis(const PaperGroup& over_e) {
   Figure figure{.title = "Fig. 3: normal force against deformation",
                 .subtitle =
@@ -184,7 +184,7 @@ Figure hysteresis(const PaperGroup& over_e) {
   return figure;
 }
 
-/// The paths of the tip; the paper has no group over H for them.
+/// Creates panels with the paths of the tip. The paper has no such panel for its group over H.
 Figure trajectory(const PaperGroups& groups) {
   Figure figure{.title = "Fig. 7: path of the fingertip during contact",
                 .subtitle = "The tip touches on the right and slides to the left",

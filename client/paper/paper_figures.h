@@ -10,14 +10,14 @@
 
 namespace oblique::client {
 
-/// A published case with its time histories, solved here.
+/// A published case with its time histories, which this program solves.
 struct PaperCase {
   PublishedCase published;
   plot::PointHistory history;  ///< including its result
   std::string name;            ///< label within its group: "H = 0.96 m"
 };
 
-/// Cases that differ in one parameter.
+/// Published cases that differ in one parameter.
 struct PaperGroup {
   std::string title;  ///< "drop H (\u03bc = 0.4, e* = 1)"
   std::vector<PaperCase> cases;
@@ -26,8 +26,8 @@ struct PaperGroup {
 /// The paper's groups in its order: over H, over e*, over small mu and over large mu.
 using PaperGroups = std::vector<PaperGroup>;
 
-/// Solves each case once. Throws solver::SolveError if a case cannot be solved, std::runtime_error
-/// if the table lacks a case.
+/// Solves each case once. Throws solver::SolveError if a case cannot be solved, and
+/// std::runtime_error if the table lacks a case.
 PaperGroups solved_groups(const PublishedTable& table, const solver::Finger& finger);
 
 /// One of the paper's figures, drawn with our results.
@@ -36,9 +36,9 @@ struct PaperFigure {
   plot::Figure figure;
 };
 
-/// Figs. 3 to 7: our solutions as curves, published numbers as diamonds. The paper publishes no
-/// instants of peaks, so diamonds are drawn at ours. Ends of phases are sums of published
-/// durations.
+/// Returns Figs. 3 to 7 with our solutions as curves and published numbers as diamonds. The paper
+/// does not publish the times of peaks, so the diamonds are at the times of our peaks. Ends of
+/// phases are sums of published durations.
 std::vector<PaperFigure> paper_figures(const PaperGroups& groups);
 
 }  // namespace oblique::client

@@ -20,14 +20,13 @@
 namespace oblique::client::plot {
 namespace {
 
-/// A range around one value.
+/// Range with a margin around a single value.
 Range around(double value, bool is_logarithmic) {
   const double half = value == 0.0 ? 0.5 : 0.1 * std::abs(value);
   return is_logarithmic ? Range{value / 1.25, value * 1.25} : Range{value - half, value + half};
 }
 
-/// Label of a quantity: its symbol with a name, else the first words of its description, else its
-/// name.
+/// Label of a quantity: its symbol with a name, else the start of its description, else its name.
 std::string label_of(const std::string& name) {
   static constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kSymbols{{
       {"H", "drop H"},
@@ -50,7 +49,7 @@ std::string label_of(const std::string& name) {
   return name;
 }
 
-/// Edges at multiples of 1, 2 or 5 times a power of ten, about `bins` apart, around the range.
+/// Returns about `bins` bin edges around the range, at multiples of 1, 2 or 5 times a power of ten.
 std::vector<double> round_edges(const Range& range, double bins) {
   const double raw = (range.to - range.from) / bins;
   const double decade = std::pow(10.0, std::floor(std::log10(raw)));
@@ -61,7 +60,7 @@ std::vector<double> round_edges(const Range& range, double bins) {
   std::vector<double> edges;
   for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
        ++i) {
-    // Below 1, dividing two whole numbers gives the same double as the decimal that people write.
+    // For steps below 1, a quotient of two whole numbers is the same double as the typed decimal.
     edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
   }
   return edges;
@@ -145,7 +144,7 @@ std::vector<double> edges_between(const std::vector<double>& values, bool is_log
     edges.push_back(is_logarithmic ? std::sqrt(values[i - 1]) * std::sqrt(values[i])
                                    : 0.5 * (values[i - 1] + values[i]));
   }
-  // The outer cells are symmetric.
+  // The outer cells extend as far beyond their value as towards the inner neighbour.
   const auto mirrored = [is_logarithmic](double end, double inner) {
     return is_logarithmic ? end / inner * end : end + (end - inner);
   };
@@ -181,7 +180,7 @@ namespace {
 using protocol::CellKind;
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
-/// The cell of each row with x and y; SIZE_MAX: none.
+/// Index of the cell that contains (x, y) of each row; SIZE_MAX if no cell does.
 std::vector<std::size_t> places_in(const Cells& cells, const Answer& answer) {
   std::vector<std::size_t> places;
   for (std::size_t row = 0; row < answer[0].numbers.size(); ++row) {
@@ -193,10 +192,11 @@ std::vector<std::size_t> places_in(const Cells& cells, const Answer& answer) {
   return places;
 }
 
-/// A text and its frequency in a cell.
+/// A cell and the number of a text in it.
 using WordOfCell = std::pair<std::size_t, std::uint32_t>;
 
-/// Names each cell by its most frequent text; of equally frequent texts by the first in the answer.
+/// Sets the value of each cell to its most frequent text. Of equally frequent texts, the one that
+/// appears first in the answer wins.
 void name_cells(Gathered& gathered, std::vector<WordOfCell>& words, const AnswerColumn& column) {
   gathered.cells.names.resize(gathered.counts.size());
   std::vector<std::ptrdiff_t> most(gathered.counts.size(), 0);
@@ -224,7 +224,7 @@ void AnswerColumn::add(const protocol::Cell& cell) {
                     : cell.kind == CellKind::kInteger ? static_cast<double>(cell.integer)
                                                       : kNoNumber);
   if (cell.kind == CellKind::kText || !word_of_row.empty()) {
-    word_of_row.resize(numbers.size(), kNoWord);  // rows before the first text
+    word_of_row.resize(numbers.size(), kNoWord);  // fills the rows before the first text
   }
   if (cell.kind == CellKind::kText) {
     const auto next = static_cast<std::uint32_t>(words.size());
@@ -283,7 +283,7 @@ std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn
   });
   of_study.insert(of_study.end(), others.begin(), others.end());
   std::sort(of_study.begin(), of_study.end());
-  // Another machine may have computed a value with a different last bit.
+  // A value computed on another machine may differ in its last bit.
   const auto end = std::unique(of_study.begin(), of_study.end(), [](double a, double b) {
     return std::abs(b - a) <= 1e-12 * std::abs(b);
   });

@@ -21,7 +21,7 @@
 namespace oblique::client::plot {
 namespace {
 
-// Lines differ in lightness, dashes and marks, so that they can be distinguished in print.
+// Line styles differ in lightness, dashes and marks, so that they are distinct in greyscale print.
 constexpr std::size_t kLineStyles = 8;
 constexpr std::string_view kStyles = R"(set encoding utf8
 set border 15 lc rgb '#556070' lw 1
@@ -38,7 +38,7 @@ set style line 7 lw 1.7 ps 0.7 lc rgb '#666666' dt (2,5) pt 6
 set style line 8 lw 1.7 ps 0.7 lc rgb '#111111' dt (14,4,4,4) pt 4
 )";
 
-/// {0}: letter of the axis, {1}: label, {2} and {3}: range.
+/// Template of an axis: {0} is its letter, {1} its label, {2} and {3} its range.
 constexpr std::string_view kAxis = R"(set {0}label {1} noenhanced
 unset logscale {0}
 set {0}tics autofreq
@@ -46,8 +46,8 @@ set format {0} '%h'
 set {0}range [{2}:{3}]
 )";
 
-/// Ticks of a logarithmic axis. {0}: letter, {1}: digits. gnuplot marks only powers of ten by
-/// itself. Ticks outside the range are not drawn.
+/// Template of the ticks of a logarithmic axis: {0} is its letter, {1} the digits to mark, because
+/// gnuplot marks only powers of ten by default. gnuplot omits ticks outside the range.
 constexpr std::string_view kLogTicks = R"(set logscale {0}
 set {0}tics ()
 do for [power=-9:9] {{ do for [digit in '{1}'] {{ set {0}tics add (digit*10.0**power) }} }}
@@ -57,41 +57,41 @@ constexpr std::array<std::uint32_t, 11> kViridis{0x440154, 0x482475, 0x414487, 0
                                                  0x2a788e, 0x21918c, 0x22a884, 0x44bf70,
                                                  0x7ad151, 0xbddf26, 0xfde725};
 
-// Compression is darker than restitution, also in grey; stick is hatched over both.
+// Compression is darker than restitution, also in greyscale; stick is hatched over both.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kSpanStyles{{
     {"compression", "fs solid 1 noborder fc rgb '#cfe1f3'"},
     {"restitution", "fs solid 1 noborder fc rgb '#fcf3e6'"},
     {"stick", "fs transparent pattern 5 noborder fc rgb '#939da7'"},
 }};
 
-/// Styles of curves by Curve::Mark.
+/// Styles of curves, indexed by Curve::Mark.
 constexpr std::array<std::string_view, 5> kMarks{
     "lines ls {}", "linespoints ls {}", "points ls {} pt 7 ps 0.4", "points ls {} pt 12 ps 1.0",
     "lines lc rgb '#202428' dt solid lw 1.5"};
 
-// Sizes of text in pixels. On a terminal one character counts as a letter.
-constexpr double kLetter = 6.5;  // average width, rounded up
+// Sizes of text in pixels. On a terminal one character has the width of a letter.
+constexpr double kLetter = 6.5;  // average width of a letter, rounded up
 constexpr double kLine = 17.0;
 constexpr double kTitle = 22.0;
 constexpr double kMargin = 12.0;
 
-/// A category of cells, or a kind of cells without a value, as drawn.
+/// Legend entry of a map: a category of cells, or a kind of cells without a value.
 struct Kind {
   std::uint32_t colour;
-  int pattern;           ///< gnuplot's number; 0: none
-  std::string_view ink;  ///< of the pattern
-  char letter;           ///< on terminals; pictures use capitals
-  std::string text;      ///< in the legend
-  std::uint64_t count;   ///< of points or cells
+  int pattern;           ///< gnuplot's number of the pattern; 0: none
+  std::string_view ink;  ///< colour of the pattern
+  char letter;           ///< on terminals; pictures show only capitals
+  std::string text;      ///< name in the legend
+  std::uint64_t count;   ///< number of points or cells
 
   bool has_capital() const { return std::isupper(static_cast<unsigned char>(letter)) != 0; }
 };
-constexpr int kNoKind = -1;  // colour or value column of the data, or blank
+constexpr int kNoKind = -1;  // the cell has a number or is blank
 
-/// The categories, followed by cells without a result, excluded and failed ones.
+/// Returns the categories, followed by the kinds no result, excluded and failed.
 std::vector<Kind> kinds_of(const Cells& cells) {
-  // Light enough for black patterns and letters: the scheme "light" of P. Tol, a brown, and four
-  // darker colours.
+  // Colours light enough for black patterns and letters: the scheme "light" of P. Tol, a brown, and
+  // four darker colours.
   static constexpr std::array<std::uint32_t, 12> kFills{0x77aadd, 0xeedd88, 0xee8866, 0x99ddff,
                                                         0xbbcc33, 0xffaabb, 0x44bb99, 0xb59a80,
                                                         0x5a88b5, 0xc2b25c, 0xc2694b, 0x70b3d1};
@@ -125,7 +125,7 @@ std::vector<Kind> kinds_of(const Cells& cells) {
   return kinds;
 }
 
-/// Number of a cell's kind.
+/// Index of a cell's kind; kNoKind if it has none.
 int kind_of(const Cells& cells, std::size_t cell) {
   const auto categories = static_cast<int>(cells.categories.size());
   const CellState state = cells.states[cell];
@@ -138,7 +138,7 @@ int kind_of(const Cells& cells, std::size_t cell) {
                                          : kNoKind;
 }
 
-/// The panel divided into equal parts, by rows from below, each with the cell at its middle.
+/// A panel in equal parts, row by row from below. Each part refers to the cell at its middle.
 struct Raster {
   std::size_t columns;
   std::size_t rows;
@@ -164,8 +164,8 @@ Raster raster_of(const Panel& panel, std::size_t columns, std::size_t rows) {
   return raster;
 }
 
-/// Places for the letter that names a category: the middles of its largest squares, far from each
-/// other.
+/// Returns where a map shows the letter of each category: the middles of its largest squares, far
+/// apart from each other.
 std::vector<std::size_t> letter_places(const Cells& cells, const Raster& raster) {
   const std::size_t columns = raster.columns;
   const auto kind_at = [&](std::size_t part) { return kind_of(cells, raster.cells[part]); };
@@ -184,7 +184,7 @@ std::vector<std::size_t> letter_places(const Cells& cells, const Raster& raster)
   std::stable_sort(corners.begin(), corners.end(),
                    [&](std::size_t a, std::size_t b) { return sides[a] > sides[b]; });
   std::vector<std::size_t> places;
-  std::map<int, std::size_t> largest;  // squares by kind
+  std::map<int, std::size_t> largest;  // size of the largest square by kind
   for (const std::size_t corner : corners) {
     const std::size_t place = corner - sides[corner] / 2 * (columns + 1);
     const int kind = kind_at(place);
@@ -205,12 +205,12 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.8g}", value) : "NaN";
 }
 
-/// Lines of at most `letters` characters, broken at spaces.
+/// Breaks a text at spaces into lines of at most `letters` characters.
 std::vector<std::string> lines_of(const std::string& text, double letters) {
   return wrapped(text, static_cast<std::size_t>(std::max(letters, 8.0)));
 }
 
-/// `text` with `mark` before each of `letters`.
+/// Returns `text` with `mark` inserted before each of the characters in `letters`.
 std::string marked(std::string_view text, std::string_view letters, char mark) {
   std::string out;
   for (const char letter : text) {
@@ -224,7 +224,7 @@ std::size_t rows_of(const Figure& figure) {
   return std::max<std::size_t>(1, (figure.panels.size() + figure.columns - 1) / figure.columns);
 }
 
-/// Builds the script of one figure.
+/// Builds the gnuplot script of one figure.
 class Script {
  public:
   Script(const Figure& figure, Size size, bool is_text)
@@ -263,7 +263,7 @@ class Script {
     out_ += is_multiplot ? "unset multiplot\n" : "";
     return std::move(out_);
   }
-  /// Height of the texts above and below the panels.
+  /// Heights of the texts above and below the panels.
   double above() const { return kMargin + kTitle + kLine * static_cast<double>(subtitle_.size()); }
   double below() const {
     return kLine * static_cast<double>(notes_.size()) + kMargin / 2.0 + (is_text_ ? kLine : 0.0);
@@ -278,11 +278,11 @@ class Script {
   void plot(fmt::format_string<Values...> form, Values&&... values) {
     plots_.push_back(fmt::format(form, std::forward<Values>(values)...));
   }
-  /// A position measured from the upper left corner.
+  /// A position in gnuplot's screen coordinates, given from the upper left corner.
   std::string screen(double x, double y) const {
     return fmt::format("screen {:.4f}, {:.4f}", x / size_.width, 1.0 - y / size_.height);
   }
-  /// Writes lines of text below each other and returns the position of the next.
+  /// Writes lines of text below each other and returns the y position of the next line.
   double label(const std::vector<std::string>& lines, double x, double y, std::string_view more) {
     for (const auto& line : lines) {
       add("set label {} at {} left noenhanced{}\n", gnuplot_text(line), screen(x, y), more);
@@ -302,7 +302,7 @@ class Script {
     }
     out_.back() = '\n';
   }
-  /// Title of an element in the key; empty: none.
+  /// Title of an element in the key; an empty title gives no entry.
   std::string titled(const std::string& title) {
     titles_.push_back(title);
     return "title " + gnuplot_text(title);
@@ -318,7 +318,7 @@ class Script {
     if (is_text_) {
       label({figure_.title}, x, y, "");
     } else {
-      // gnuplot needs enhanced text for bold letters; a backslash keeps these characters unchanged.
+      // Bold letters need gnuplot's enhanced text. A backslash makes characters literal.
       const auto title = gnuplot_text(marked(protocol::visible(figure_.title), "\\_^{}@&~", '\\'));
       add("set label '{{/:Bold*1.25 {}}}' at {} left\n", title.substr(1, title.size() - 2),
           screen(x, y));
@@ -339,7 +339,7 @@ class Script {
     }
   }
 
-  /// Position of the panel in the picture, and its title.
+  /// Writes the position of the panel in the picture, and its title.
   void write_frame(const Panel& panel, std::size_t index) {
     frame_.width = size_.width / static_cast<double>(figure_.columns);
     frame_.height = (size_.height - above() - below()) / static_cast<double>(rows_of(figure_));
@@ -358,7 +358,7 @@ class Script {
     }
   }
 
-  /// Width, in letters, for the numbers or names left of panels, the same for all.
+  /// Width, in letters, of the numbers or names left of the panels: the maximum of all panels.
   double left_letters() const {
     std::size_t longest = 10;
     for (const Panel& panel : figure_.panels) {
@@ -369,8 +369,8 @@ class Script {
     return static_cast<double>(longest + 3);
   }
 
-  /// Places the key beside the panel if the picture has room there or the panel is narrow, else
-  /// below it in as many columns as fit.
+  /// Places the key beside the panel if the picture has room there or the panel is narrow.
+  /// Otherwise the key is below the panel, in as many columns as fit.
   void write_key(const Panel& panel) {
     const bool is_alone = figure_.panels.size() == 1;
     const bool is_below = is_alone ? has_colours() || is_text_ : !panel.has_equal_aspect;
@@ -384,7 +384,7 @@ class Script {
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
     add("set key {} maxcols {}\n",
         !is_below  ? "rmargin top vertical"
-        : is_text_ ? "bmargin left horizontal"  // without it letters would overlap
+        : is_text_ ? "bmargin left horizontal"  // width -1 would make letters overlap
                    : "bmargin left horizontal width -1",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {
@@ -392,7 +392,7 @@ class Script {
           1.0 - (frame_.bottom - (1.15 * lines + 3.8) * kLine) / size_.height);
     }
     if (!is_alone) {
-      // Aligns the axes of panels below each other.
+      // Aligns the axes of panels that are in one column.
       add("set lmargin at screen {:.4f}\nset rmargin at screen {:.4f}\n",
           (frame_.left + left_letters() * kLetter) / size_.width,
           (frame_.left + frame_.width - (is_below ? 3.0 : 28.0) * kLetter) / size_.width);
@@ -407,7 +407,7 @@ class Script {
     write_axis("x", panel.x);
     FigureAxis y = panel.y;
     if (is_text_ && figure_.panels.size() > 1) {
-      y.label.clear();  // it would cover numbers
+      y.label.clear();  // the label would cover numbers
     }
     write_axis("y", y);
     for (const Span& span : panel.spans) {
@@ -434,8 +434,8 @@ class Script {
     out_ += figure_.panels.size() == 1 ? "" : "unset label\nunset object\n";
   }
 
-  /// Draws cells by values and kinds: colours, patterns, borders between categories, and letters.
-  /// Equal neighbours in a row become one rectangle.
+  /// Draws the cells of a map: colours, patterns, borders between categories, and letters. Equal
+  /// neighbours in a row are merged into one rectangle.
   void write_cells(const Panel& panel, const std::vector<Kind>& kinds) {
     const Cells& cells = *panel.cells;
     out_ += "\n# Cells: x y x0 x1 y0 y1 kind, and a colour or, of kind -1, a value\n";
@@ -459,7 +459,7 @@ class Script {
                            : static_cast<double>(kinds[static_cast<std::size_t>(kind)].colour)});
     }
     out_ += "EOD\n";
-    // The border closes the gaps that viewers show between rectangles.
+    // Without the border, viewers show gaps between rectangles.
     constexpr std::string_view kRectangles =
         "{} using ($7{}0?$1:NaN):2:3:4:5:6:8 with boxxyerror fs solid 1 lc {} lw 0.3 notitle";
     if (has_colours()) {
@@ -478,8 +478,7 @@ class Script {
       }
     }
     if (has_borders) {
-      // The picture has room beside the map, so a part of the raster is about 5 pixels wide and
-      // high.
+      // The picture is wider than the map, so a part of the raster is about 5 pixels wide and high.
       const auto raster = raster_of(panel, static_cast<std::size_t>(0.13 * size_.width),
                                     static_cast<std::size_t>(0.13 * size_.height));
       for (const std::size_t place : letter_places(cells, raster)) {
@@ -492,8 +491,8 @@ class Script {
     }
   }
 
-  /// Draws lines between neighbours of different categories. Returns false and draws none if too
-  /// many differ to distinguish areas by borders and patterns.
+  /// Draws lines between neighbours of different categories. Draws nothing and returns false if
+  /// there are too many lines to distinguish areas.
   bool write_borders(const Panel& panel) {
     const Cells& cells = *panel.cells;
     const auto categories = static_cast<int>(cells.categories.size());
@@ -530,12 +529,12 @@ class Script {
     return true;
   }
 
-  /// gnuplot fills no rectangles on a terminal: a map consists of characters, one per category or
-  /// from light to dark.
+  /// gnuplot cannot fill rectangles on a terminal. The map therefore consists of characters: one
+  /// per category, or a scale from light to dark.
   void write_characters(const Panel& panel, const std::vector<Kind>& kinds) {
     constexpr std::string_view kLightToDark = ".:-=+*%#@";
     const Cells& cells = *panel.cells;
-    // With more characters than columns, some overwrite others.
+    // The raster has one part per character of the terminal; more would overwrite each other.
     const auto raster = raster_of(panel, static_cast<std::size_t>(size_.width / kLetter),
                                   static_cast<std::size_t>(size_.height / kLine));
     const auto data = begin_data();
@@ -560,8 +559,8 @@ class Script {
     plot("{} using 1:2:3:4 with labels tc rgb variable notitle", data);
   }
 
-  /// The legend of a map: entries of gnuplot's key or, for categories, which need colour, pattern
-  /// and letter, drawn beside the map.
+  /// Writes the legend of a map. Entries for categories need colour, pattern and letter, so they
+  /// are drawn beside the map; other entries use gnuplot's key.
   void write_legend(const Cells& cells, const std::vector<Kind>& kinds) {
     const bool is_key = is_text_ || cells.categories.empty();
     const double sample = 4.4 * kLetter;
@@ -614,7 +613,7 @@ class Script {
     if (!bars.names.empty()) {
       std::vector<std::string> ticks;
       for (const std::string& name : bars.names) {
-        // % begins a format in a tick.
+        // In a tick, gnuplot reads % as the beginning of a format.
         ticks.push_back(fmt::format("{} {}", gnuplot_text(marked(name, "%", '%')), ticks.size()));
       }
       add("set ytics ({}) noenhanced\nset yrange [{}:-0.7] noreverse\nset grid noytics\n",
@@ -652,8 +651,7 @@ class Script {
     for (const Curve& curve : panel.curves) {
       const bool is_coloured = !curve.colours.empty() && has_colours();
       const auto data = begin_data();
-      const std::size_t step = 1 + curve.x.size() / 1000;  // more points than pixels are not
-                                                           // visible
+      const std::size_t step = 1 + curve.x.size() / 1000;  // draws about one point per pixel
       for (std::size_t i = 0; i < curve.x.size(); ++i) {
         if (curve.mark == Curve::Mark::kLine && i % step != 0 && i + 1 < curve.x.size() &&
             std::isfinite(curve.y[i])) {
@@ -691,7 +689,7 @@ class Script {
   std::vector<std::string> notes_;
   struct {
     double left, bottom, width, height;
-  } frame_{};                        // of the panel, from the upper left corner
+  } frame_{};                        // position of the panel, from the upper left corner
   std::vector<std::string> titles_;  // titles in the key of the panel
   bool has_span_key_ = false;        // only one panel's key names the spans
   std::string out_;

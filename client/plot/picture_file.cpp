@@ -25,20 +25,20 @@
 namespace oblique::client::plot {
 namespace {
 
-/// Names and endings in the order of PictureFormat.
+/// Names and file endings of the formats, in the order of PictureFormat.
 constexpr std::array<std::string_view, 5> kFormats{"svg", "pdf", "png", "gp", "csv"};
 constexpr double kSmallestSide = 240.0;
 constexpr double kLargestSide = 10'000.0;
 constexpr std::size_t kMaxBytes = std::size_t{256} << 20U;
 constexpr std::chrono::seconds kTimeLimit{120};  // a map of 10^5 cells takes about 2 s
 
-/// NaN becomes NULL, an empty field.
+/// NaN becomes NULL, which is an empty field in CSV.
 protocol::Value value_of(double number) {
   return std::isnan(number) ? protocol::Value() : protocol::Value(number);
 }
 
 protocol::Table cells_table(const Panel& panel, const Cells& cells) {
-  // In the order of CellState.
+  // Names in the order of CellState.
   constexpr std::array<const char*, 6> kStates{"solved", "no result", "filtered",
                                                "failed", "no value",  "no point"};
   protocol::Table table{.columns = {panel.x.name, panel.y.name, cells.name, "state"}};
@@ -128,7 +128,7 @@ PictureFormat picture_format(const std::string& name, const std::string& file) {
 
 std::string output_of_gnuplot(const std::string& script) {
   try {
-    // Ignores the user's ~/.gnuplot.
+    // --default-settings ignores the user's ~/.gnuplot.
     ChildProcess gnuplot({.program = "gnuplot",
                           .arguments = {"--default-settings", "-"},
                           .keep_output = true,
@@ -142,7 +142,7 @@ std::string output_of_gnuplot(const std::string& script) {
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    // gnuplot returns 0 after some errors, without output.
+    // After some errors gnuplot returns 0, but its output is empty.
     std::string output = gnuplot.output(kMaxBytes);
     if (!gnuplot.succeeded() || output.empty()) {
       throw std::runtime_error(
@@ -188,7 +188,7 @@ std::string text_of(const Figure& figure) {
   if (figure.panels.size() > 1) {
     lines = 20 * figure.panels.size();
   } else if (!figure.panels.empty() && figure.panels.front().cells) {
-    lines += figure.panels.front().cells->categories.size();  // the rest is for the legend
+    lines += figure.panels.front().cells->categories.size();  // the legend has a line per category
   }
   Figure below = figure;
   below.columns = 1;

@@ -64,7 +64,7 @@ StudyShape shape_of_block(const protocol::Recipe& recipe, std::size_t number,
   return shape;
 }
 
-/// The axes of all blocks, each with the values that any block gives to its key.
+/// Returns the shape with the axes of all blocks, each with the values that any block gives it.
 StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   shape.is_one_block = false;
   for (const Block& block : recipe.blocks()) {
@@ -84,27 +84,27 @@ StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   return shape;
 }
 
-/// The key and value of an --at; NaN if the value is not a number.
+/// Splits "KEY=VALUE" of --at into key and value; the value is NaN if it is not a number.
 std::pair<std::string, double> parsed_at(const std::string& text) {
   const std::size_t equals = std::min(text.find('='), text.size());
   const auto value = solver::number_of(text.substr(std::min(equals + 1, text.size())));
   return {text.substr(0, equals), value && std::isfinite(*value) ? *value : std::nan("")};
 }
 
-/// The value of the axis nearest to the given one.
+/// Returns the value of the axis that is nearest to `wanted`.
 double nearest_value(const StudyAxis& axis, double wanted) {
   return *std::min_element(axis.values.begin(), axis.values.end(), [wanted](double a, double b) {
     return std::abs(a - wanted) < std::abs(b - wanted);
   });
 }
 
-/// Whether a typed value stands for `value` of the axis: tables show only six digits.
+/// Whether a typed value means `value` of an axis. Tables show six digits, so these must agree.
 bool means(double typed, double value) {
   return std::abs(value - typed) <= 1e-5 * std::abs(typed);
 }
 
 /// Whether the picture can show this block alone: the requested axes vary in it, it has the values
-/// of --at, and enough axes are open.
+/// of --at, and enough axes are not fixed.
 bool suits(const StudyShape& shape, const PlotRequest& request) {
   for (const std::string& name : {request.x, request.y, request.by}) {
     const StudyAxis* axis = shape.find(name);
@@ -125,7 +125,7 @@ bool suits(const StudyShape& shape, const PlotRequest& request) {
   return open >= (!request.map.empty() ? 2 : request.lines.empty() ? 0 : 1);
 }
 
-/// The block that --block names, from 0; none if it names none.
+/// Index of the block that --block names, from 0; nothing if --block is empty or "all".
 std::optional<std::size_t> block_named(const std::string& text, std::size_t blocks) {
   if (text.empty() || text == "all") {
     return std::nullopt;
@@ -185,7 +185,7 @@ void add_term(std::string& sql, const std::string& term) {
   sql += (sql.empty() ? "" : " AND ") + term;
 }
 
-/// Fixes the axis at a value; the subtitle shows it.
+/// Fixes the axis at a value, which the subtitle of the picture shows.
 void fix(Condition& condition, const StudyAxis& axis, double value) {
   if (axis.varies()) {
     const std::string term = fmt::format("{} = {}", axis.column, solver::exact_number(value));
@@ -203,9 +203,9 @@ std::string without_spaces(std::string_view text) {
              : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
 }
 
-/// If two axes are open and one has few values, that axis gives the lines, because cells between
-/// its values would cover values that the study does not have. Returns the other axis, along which
-/// lines run; nullptr if a map is better.
+/// Chooses lines instead of a map if two axes are open and one of them has few values: cells of a
+/// map would extend over values that the study does not have. Returns the axis along which the
+/// lines run, or nullptr if a map is better.
 const StudyAxis* axis_of_few_lines(const std::vector<const StudyAxis*>& open) {
   constexpr std::size_t kFew = 3;
   if (open.size() != 2 || !open[0]->is_listed || !open[1]->is_listed ||

@@ -15,11 +15,12 @@
 namespace oblique::client::plot {
 
 /// The flags of `oblique plot` for a study. Texts are SQL over the columns of queries. At most one
-/// of the first four is given; without them a suitable picture is drawn.
+/// of `map`, `lines`, `scatter` and `histogram` is given; if none is, the program chooses a
+/// picture.
 struct PlotRequest {
   std::string study{};
-  std::string map{};        ///< an output over two axes
-  std::string lines{};      ///< an output over one axis
+  std::string map{};        ///< an output shown over two axes
+  std::string lines{};      ///< an output shown over one axis
   std::string scatter{};    ///< two columns: "X,Y"
   std::string histogram{};  ///< a column
   std::string x{};          ///< empty: chosen
@@ -35,79 +36,78 @@ struct PlotRequest {
   std::string range{};  ///< "FROM:TO"
 };
 
-/// Checks everything that does not depend on the study. Throws solver::InputError with the flag.
+/// Checks all flags as far as possible without the study. Throws solver::InputError with the flag.
 void check(const PlotRequest& request);
 
-/// The range of --range; nothing if it is not given. Throws solver::InputError for an invalid
-/// range.
+/// The range of --range; nothing if not given. Throws solver::InputError for an invalid range.
 std::optional<Range> range_given(const PlotRequest& request);
 
 std::pair<std::string, std::string> scatter_columns(const PlotRequest& request);
 
-/// A key that has values in the study.
+/// A parameter (key) that has values in the study.
 struct StudyAxis {
   std::string key;     ///< name in study files: "E"
   std::string column;  ///< column in queries: "E_Pa"; an expression for single lengths
-  /// The values in the picture, ascending; empty if they are drawn from a distribution, follow from
+  /// Values in the picture, ascending. Empty if they are drawn from a distribution, follow from
   /// other keys, or are more than kMaxListed.
   std::vector<double> values = {};
   bool is_listed = true;        ///< `values` is complete
-  bool is_logarithmic = false;  ///< the range is logarithmic
+  bool is_logarithmic = false;  ///< the study file gives the range with spacing "log"
 
   bool varies() const { return !is_listed || values.size() > 1; }
   bool is_named(std::string_view name) const { return name == key || name == column; }
-  /// Label in pictures: E_Pa for E, because SQL does not distinguish E and e.
+  /// Label in pictures. E is labelled E_Pa, because SQL does not distinguish E and e.
   const std::string& label() const { return key == "E" ? column : key; }
 };
 inline constexpr std::uint64_t kMaxListed = 100'000;
 
-/// Structure of a study, as far as pictures need it.
+/// The structure of a study that pictures need: axes, blocks and numbers of points.
 struct StudyShape {
   std::vector<StudyAxis> axes;  ///< in the order of the recipe: model keys, then H, mu and e
   bool is_grid = true;          ///< the chosen block multiplies its axes
-  std::size_t block = 0;        ///< the chosen block, from 0
+  std::size_t block = 0;        ///< index of the chosen block, from 0
   std::uint64_t first_point = 0;
   std::uint64_t block_points = 0;
   std::size_t blocks = 1;     ///< of the study
-  std::uint64_t points = 0;   ///< of all blocks, including points that filters leave out
-  bool is_one_block = false;  ///< pictures show one of several blocks
+  std::uint64_t points = 0;   ///< number in all blocks, including points that filters leave out
+  bool is_one_block = false;  ///< the study has several blocks and the picture shows one
 
-  /// The axis of that key or column; nullptr: none.
+  /// Returns the axis with that key or column, or nullptr.
   const StudyAxis* find(std::string_view name) const;
-  /// The keys with more than one value, in the order of choice for axes: mu, H, then those with the
-  /// most values.
+  /// Returns the axes with more than one value, in the order in which a picture chooses them: mu,
+  /// H, then those with the most values.
   std::vector<const StudyAxis*> by_preference() const;
   std::vector<std::string_view> keys() const;
 };
 
-/// Reads the structure of the study. With several blocks, a map or lines show one: the block of
-/// `--block`, else the one with the most points among those with the requested axes and values. All
-/// blocks are shown with `--block all`, if no suitable block is a grid, and for points and
-/// histograms without --block. Throws solver::InputError for an unknown block and for a recipe
+/// Reads the structure of the study. If it has several blocks, a map or lines show one of them:
+/// `--block`, else the block with the most points among those with the requested axes and values.
+/// The picture shows all blocks with `--block all`, if no suitable block is a grid, and for points
+/// and histograms without --block. Throws solver::InputError for an unknown block and for a recipe
 /// without points.
 StudyShape shape_for(const protocol::Recipe& recipe, const PlotRequest& request);
 
 struct ChosenAxis {
   std::string column;               ///< column in queries
   std::string name;                 ///< label
-  const StudyAxis* axis = nullptr;  ///< nullptr: a column of results
+  const StudyAxis* axis = nullptr;  ///< nullptr for a column of results
 };
 
-/// The key or column that a flag names. Throws solver::InputError for an unknown word, with the
-/// nearest one; the source checks other expressions.
+/// Returns the key or column that the text of a flag names. Throws solver::InputError for an
+/// unknown word, with the nearest known word; the source checks other expressions.
 ChosenAxis chosen_axis(const std::string& flag, const std::string& text, const StudyShape& shape);
 
-/// The condition on the points of a picture.
+/// SQL condition that selects the points of a picture.
 struct Condition {
   std::string sql;                 ///< empty: all points
-  std::string sql_without_where;   ///< the same without --where
+  std::string sql_without_where;   ///< `sql` without the condition of --where
   std::vector<std::string> shown;  ///< values for the subtitle: "e = 0.9"
   std::vector<std::string> said;   ///< sentences about choices
 };
 
-/// --where and --at and, with `fixes_others`, the first value of each other open axis. `drawn`: the
-/// axes of the picture. Throws solver::InputError if an --at names no key or a value that the key
-/// does not have, with the nearest.
+/// Combines --where and --at. With `fixes_others`, each other open axis is fixed at its first
+/// value. `drawn` holds the axes of the picture. Throws solver::InputError if an --at names no key,
+/// or a value that the key does not have; the error gives the nearest.
 Condition condition_of(const PlotRequest& request, const StudyShape& shape,
                        const std::vector<ChosenAxis>& drawn, bool fixes_others);
 
@@ -115,13 +115,14 @@ bool where_names(const PlotRequest& request, const StudyAxis& axis);
 /// Whether an --at fixes the axis.
 bool at_holds(const PlotRequest& request, const StudyAxis& axis);
 
-/// The request with a suitable kind of picture if none is requested: a map of the largest normal
-/// force over two axes, lines over one axis or if another has few values, points if they are
-/// scattered.
+/// Returns the request with a kind of picture chosen if none is requested: a map of the largest
+/// normal force for two axes; lines for one axis, or if the second has few values; single points if
+/// they are not on a grid.
 PlotRequest completed(PlotRequest request, const StudyShape& shape);
 
-/// Draws the rows of `source`. `tell` receives sentences about choices. Throws solver::InputError,
-/// with the flag and the remedy, if the request does not fit the study, and what the source throws.
+/// Draws the rows of `source`. `tell` receives sentences about automatic choices. Throws the errors
+/// of the source, and solver::InputError, with the flag and the remedy, if the request does not fit
+/// the study.
 Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& request,
                  const Tell& tell);
 

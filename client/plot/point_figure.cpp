@@ -18,7 +18,7 @@ namespace {
 using solver::readable_number;
 using solver::TraceRow;
 
-/// Time spans of compression and restitution, then those of stick.
+/// Time spans of compression and restitution, followed by the stick intervals.
 std::vector<Span> spans_of(const PointHistory& history) {
   std::vector<Span> spans;
   const auto& rows = history.rows;
@@ -40,9 +40,9 @@ std::vector<Span> spans_of(const PointHistory& history) {
   return spans;
 }
 
-/// Energy that the finger transfers to the contact since touch [J]: lost to friction at P, and
-/// stored or lost in the normal and tangential element. Trapezoidal sums over the positions of tip
-/// and P: exact for the normal element and while P sticks.
+/// Energy [J] that the finger has transferred to the contact since touch: dissipated by friction at
+/// P, and stored or dissipated in the normal and tangential element. The trapezoidal sums over the
+/// positions of tip and P are exact for the normal element and while P sticks.
 std::pair<Curve, Curve> contact_energies(const PointHistory& history) {
   auto friction = curve_of(history, "lost to friction", 1, &TraceRow::t_s);
   auto element = curve_of(history, "in the normal and tangential element", 3, &TraceRow::t_s);
@@ -54,7 +54,7 @@ std::pair<Curve, Curve> contact_energies(const PointHistory& history) {
     const auto& before = rows[i == 0 ? 0 : i - 1];
     const double fn_N = 0.5 * (before.fn_N + row.fn_N);
     const double ft_N = 0.5 * (before.ft_N + row.ft_N);
-    // The tip works against both forces; the part that moves P is lost.
+    // The tip does work against both forces; the work that moves P is dissipated.
     const double lost_J = -ft_N * (row.xP_m - before.xP_m);
     friction_J += lost_J;
     element_J += -fn_N * (row.y_m - before.y_m) - ft_N * (row.x_m - before.x_m) - lost_J;
@@ -64,7 +64,7 @@ std::pair<Curve, Curve> contact_energies(const PointHistory& history) {
   return {std::move(friction), std::move(element)};
 }
 
-/// A panel over time with phases and stick shaded.
+/// Returns an empty panel over time, with phases and stick intervals shaded.
 Panel over_time(const PointHistory& history, std::string title, FigureAxis axis,
                 std::vector<Curve> curves) {
   Panel panel;
@@ -94,7 +94,7 @@ Panel energies_panel(const PointHistory& history) {
                    std::move(curves));
 }
 
-/// Rows of compression or of restitution, separated by gaps.
+/// Returns the rows of all compressions or all restitutions as one curve, with gaps between phases.
 Curve branch_of(const PointHistory& history, char phase, std::string name, std::size_t stroke) {
   Curve curve{.name = std::move(name), .stroke = stroke};
   const auto& rows = history.rows;
@@ -161,7 +161,7 @@ Panel shape_panel(const PointHistory& history) {
   panel.x.range = {std::min(panel.x.range.from, -edge_m), reach_m + edge_m};
   add("ground", {panel.x.range.from, -history.H_m, panel.x.range.to, -history.H_m}, 6);
   fit(panel.y, panel.curves, &Curve::y);
-  // Makes the panel of a shallow drop, drawn to scale, tall enough.
+  // Gives the panel enough height for a shallow drop that is drawn to scale.
   const double least_m = 0.3 * (panel.x.range.to - panel.x.range.from);
   const double lacking_m = std::max(0.0, least_m - (panel.y.range.to - panel.y.range.from));
   panel.y.range = {panel.y.range.from - 0.5 * lacking_m, panel.y.range.to + 0.5 * lacking_m};
@@ -169,7 +169,7 @@ Panel shape_panel(const PointHistory& history) {
 }
 
 std::string energy_note(const solver::ContactEnergy& energy) {
-  // With e* = 1 only rounding is lost.
+  // With e* = 1 the loss consists of rounding errors only.
   const double lost_J =
       energy.restitution_J > 1e-12 * energy.exchanged_J ? energy.restitution_J : 0.0;
   return fmt::format(

@@ -23,12 +23,12 @@ namespace {
 using solver::InputError;
 using solver::readable_number;
 
-constexpr std::size_t kMaxCellsAlong = 320;  // values of an axis; for more, cells group values
-constexpr std::size_t kMaxCategories = 12;   // categories with their own entry
-constexpr std::size_t kMaxNamedLines = 8;    // lines; more are coloured by their value
-constexpr std::size_t kMaxMarked = 60;       // points of a line with marks
-constexpr std::size_t kMaxDots = 4000;       // points; more are grouped in cells
-constexpr std::size_t kMaxNames = 16;        // bars of a histogram of texts
+constexpr std::size_t kMaxCellsAlong = 320;  // maximum number of cells along an axis
+constexpr std::size_t kMaxCategories = 12;   // maximum number of categories in the legend
+constexpr std::size_t kMaxNamedLines = 8;    // maximum number of lines with names in the key
+constexpr std::size_t kMaxMarked = 60;       // maximum number of points on a line with marks
+constexpr std::size_t kMaxDots = 4000;       // maximum number of points drawn one by one
+constexpr std::size_t kMaxNames = 16;        // maximum number of bars for texts
 
 bool is_drawable(double value, bool is_logarithmic) {
   return std::isfinite(value) && (!is_logarithmic || value > 0.0);
@@ -38,7 +38,7 @@ std::string counted(std::uint64_t count, const std::string& noun) {
   return client::counted(count, noun, noun + "s");
 }
 
-/// Sorts categories by their points, largest first; those with very few points become one.
+/// Sorts categories by number of points, largest first, and merges very small ones into one.
 std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& points,
                                     const std::string& plural) {
   std::vector<Category> categories;
@@ -53,10 +53,10 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   if (kept > kMaxCategories) {
     kept = kMaxCategories;
     while (kept > 1 && categories[kept - 1].points * 400 < whole) {
-      --kept;  // less than 0.25 % is not visible
+      --kept;  // less than 0.25 % of the points is not visible
     }
   }
-  if (kept + 1 >= categories.size()) {  // a single category keeps its name
+  if (kept + 1 >= categories.size()) {  // a single category is not merged
     return categories;
   }
   Category other{.name = fmt::format("{} other {}", format_count(categories.size() - kept), plural),
@@ -69,7 +69,7 @@ std::vector<Category> categories_of(const std::map<std::string, std::uint64_t>& 
   return categories;
 }
 
-/// The most frequent texts, largest first, and one bar for the others.
+/// Returns bars for the most frequent texts, largest first, and one bar for all others.
 Bars bars_of_names(const AnswerColumn& column) {
   std::vector<std::pair<double, std::string>> counts;
   for (const auto& word : column.words) {
@@ -77,7 +77,7 @@ Bars bars_of_names(const AnswerColumn& column) {
   }
   for (const std::uint32_t word : column.word_of_row) {
     if (word != AnswerColumn::kNoWord) {
-      counts[word].first -= 1.0;  // negative, so that sorting puts the largest first
+      counts[word].first -= 1.0;  // negative counts sort the largest first
     }
   }
   std::sort(counts.begin(), counts.end());
@@ -94,7 +94,7 @@ Bars bars_of_names(const AnswerColumn& column) {
   return bars;
 }
 
-/// Throws InputError for a column of texts, which an axis cannot show.
+/// Throws InputError if the column contains texts, which an axis cannot show.
 void refuse_texts(const std::string& flag, const AnswerColumn& column) {
   if (column.has_texts()) {
     throw InputError(
@@ -125,7 +125,7 @@ class FigureBuilder {
     note("Nothing to draw: " + why + ".");
   }
 
-  /// Queries columns under a condition; grouped: one row per pair of values.
+  /// Queries columns under a condition. If grouped, the answer has one row per pair of values.
   Answer query(const std::vector<std::string>& columns, const std::string& where,
                bool is_grouped = false) {
     ResultQuery query;
@@ -143,8 +143,8 @@ class FigureBuilder {
     return answer;
   }
 
-  /// The axis of a flag, else the first that is neither taken nor fixed by --at. Throws InputError
-  /// with the remedy if there is none.
+  /// Returns the axis that a flag names. Without the flag, returns the first axis that is not
+  /// `taken` and not fixed by --at. Throws InputError with the remedy if there is none.
   ChosenAxis chosen_or(const std::string& flag, const std::string& text,
                        const std::vector<ChosenAxis>& taken, const std::string& remedy) const {
     if (!text.empty()) {
@@ -160,8 +160,8 @@ class FigureBuilder {
     throw InputError(fmt::format("{} {}", request_.study, remedy));
   }
 
-  /// Throws InputError, with the flag, for texts, and for a logarithmic axis without positive
-  /// values.
+  /// Throws InputError that names the flag if the column contains texts, or if a logarithmic axis
+  /// has no positive value.
   FigureAxis axis_for(const std::string& flag, const ChosenAxis& axis, const AnswerColumn& column,
                       bool is_logarithmic) const {
     refuse_texts("", column);
@@ -176,7 +176,7 @@ class FigureBuilder {
     return made;
   }
 
-  /// Sets the colour scale from --range or the values; adds a note if values lie outside.
+  /// Sets the range of the colours from --range or the values; adds a note if values lie outside.
   void set_colours(FigureAxis axis, const std::vector<double>& values) {
     axis.is_logarithmic = request_.is_colour_logarithmic;
     const Range all = range_of(values, axis.is_logarithmic);
@@ -190,7 +190,7 @@ class FigureBuilder {
     figure_.colours = std::move(axis);
   }
 
-  /// Sets title and subtitle; reports choices.
+  /// Sets title and subtitle; reports automatic choices.
   void add_titles(const std::string& what, std::uint64_t points) {
     figure_.title = fmt::format("{}: {}", request_.study, what);
     for (const auto& shown : condition_.shown) {
@@ -218,7 +218,7 @@ class FigureBuilder {
 
   // ---- Maps -------------------------------------------------------------------------------------
 
-  /// The values of an axis of cells; empty if cells group values.
+  /// Values along an axis of cells; empty if each cell groups several values.
   std::vector<double> cell_values(const ChosenAxis& axis, const AnswerColumn& column) const {
     if (!shape_.is_grid || axis.axis == nullptr || !axis.axis->is_listed) {
       return {};
@@ -243,23 +243,22 @@ class FigureBuilder {
       auto gathered = gathered_in(answer, cells_around(x_values, panel_.x.is_logarithmic),
                                   cells_around(y_values, panel_.y.is_logarithmic));
       if (!request_.where.empty() && gathered.cells.count(CellState::kNoResult) > 0) {
-        // Cells without a row may have points that --where excludes.
+        // A cell without a row may have points that --where excludes.
         mark_filtered(gathered.cells,
                       query({x.column, y.column}, condition_.sql_without_where, true));
       }
       return gathered;
     }
-    // About three points per cell.
+    // Chooses the number of cells so that a cell has about three points.
     const double side = std::sqrt(static_cast<double>(answer[0].numbers.size()) / 3.0);
     panel_.x.span(range_of(answer[0].numbers, panel_.x.is_logarithmic));
     panel_.y.span(range_of(answer[1].numbers, panel_.y.is_logarithmic));
     return gather_scattered(answer, static_cast<std::size_t>(std::clamp(side, 8.0, 320.0)));
   }
 
-  /// Groups points in cells of equal size, at most `most` along an axis. Empty cells are not marked
-  /// as missing.
+  /// Groups points in equal cells, at most `most` along an axis. Empty cells are not marked.
   Gathered gather_scattered(const Answer& answer, std::size_t most) const {
-    // For few different values, such as those of a grid, there are fewer cells than values;
+    // An axis with few different values, such as those of a grid, gets fewer cells than values;
     // otherwise empty cells would form stripes.
     const auto cells_for = [most](const FigureAxis& axis, std::vector<double> values) {
       std::sort(values.begin(), values.end());
@@ -274,7 +273,7 @@ class FigureBuilder {
     return gathered;
   }
 
-  /// Sets the colour scale of cells with numbers; clears values that are not on it.
+  /// Sets the colour scale of cells with numbers; clears values that the scale cannot show.
   void colour_cells(Cells& cells, const FigureAxis& axis) {
     std::vector<double> values;
     for (std::size_t i = 0; i < cells.values.size(); ++i) {
@@ -319,7 +318,7 @@ class FigureBuilder {
     const std::string remedy = fmt::format(
         "has fewer than two axes{}: use --lines, --scatter or --histogram, or name --x and --y",
         request_.at.empty() ? "" : " that --at leaves open");
-    // Excludes the axis of --y from the choice for x.
+    // The axis of --y is not available for x.
     std::vector<ChosenAxis> taken;
     if (!request_.y.empty()) {
       taken.push_back(chosen_axis("--y", request_.y, shape_));
@@ -367,12 +366,12 @@ class FigureBuilder {
 
   // ---- Lines ------------------------------------------------------------------------------------
 
-  /// The axis whose values become lines; none: one line is drawn.
+  /// Returns the axis that gives one line per value, or nothing if one line is drawn.
   std::optional<ChosenAxis> lines_by(const ChosenAxis& x) const {
     if (!request_.by.empty()) {
       return chosen_axis("--by", request_.by, shape_);
     }
-    // The other axis with the fewest values gives the fewest lines.
+    // The axis with the fewest values gives the fewest lines.
     const StudyAxis* fewest = nullptr;
     for (const StudyAxis* axis : shape_.by_preference()) {
       const bool is_open = shape_.is_grid && axis != x.axis && axis->is_listed &&
@@ -566,7 +565,7 @@ class FigureBuilder {
   Panel panel_ = {};
 };
 
-/// Throws InputError for a logarithmic axis with a --range that reaches 0.
+/// Throws InputError if --range reaches 0 on a logarithmic axis.
 void check_range(const PlotRequest& request) {
   const bool has_colours = !request.map.empty() || !request.scatter.empty();
   const auto [flag, is_logarithmic] =

@@ -31,7 +31,7 @@ using protocol::Value;
 
 struct Column {
   std::string name;
-  std::string unit;  ///< SI; empty for pure numbers and texts
+  std::string unit;  ///< SI unit; empty for pure numbers and texts
   std::vector<Value> values;
 
   template <class Kind>
@@ -60,7 +60,8 @@ std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryReque
   return columns;
 }
 
-/// int64 if all values are integers; a list if some are texts; else float64 with NaN for NULL.
+/// Returns an int64 array if all values are integers, a list if some are texts, else a float64
+/// array with NaN for NULL.
 py::object values_of(const Column& column) {
   const auto kind = server::kind_of_values(column.name);
   const bool has_real = column.has<double>();
@@ -86,7 +87,7 @@ py::object values_of(const Column& column) {
                       : py::object(array_of(std::move(reals)));
 }
 
-/// A database file. Every call opens it, so calls from several threads share nothing.
+/// A database file. Each call opens the file, so calls from several threads share nothing.
 class Database {
  public:
   explicit Database(const std::string& file) : file_(std::filesystem::absolute(file).string()) {
@@ -95,7 +96,7 @@ class Database {
       throw std::filesystem::filesystem_error(
           "", file_, std::make_error_code(std::errc::no_such_file_or_directory));
     }
-    const server::Reader reader(file_);  // throws if it is not a database of oblique
+    const server::Reader reader(file_);  // throws if the file is not a database of oblique
   }
 
   py::list query(const std::string& study, const std::string& where, const std::string& select,
@@ -146,7 +147,7 @@ class Database {
                                  [reader] { reader->interrupt(); });
   }
 
-  /// (name, unit, values) of each column.
+  /// Runs a query; returns (name, unit, values) of each column.
   py::list ask(const protocol::QueryRequest& request) {
     const auto columns = with_reader<std::vector<Column>>(
         [request](server::Reader& reader) { return answer_to(reader, request); });

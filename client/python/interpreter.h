@@ -17,18 +17,19 @@ namespace oblique::python {
 void add_solving(pybind11::module_& module);
 void add_database(pybind11::module_& module);
 
-/// An array that owns the values.
+/// Creates a NumPy array that owns the values.
 template <class T>
 pybind11::array_t<T> array_of(std::vector<T>&& values) {
-  auto* const owned = new std::vector<T>(std::move(values));  // the capsule deletes it
+  auto* const owned = new std::vector<T>(std::move(values));  // the capsule below deletes it
   const pybind11::capsule owner(owned,
                                 [](void* kept) { delete static_cast<std::vector<T>*>(kept); });
   return pybind11::array_t<T>(static_cast<pybind11::ssize_t>(owned->size()), owned->data(), owner);
 }
 
-/// Releases the interpreter's lock while it exists. If Python ends meanwhile, which can happen
-/// under a daemon thread, the thread blocks for ever instead of taking the lock again: Python would
-/// unwind its stack, and C++ destructors do not survive that.
+/// Releases the lock of the Python interpreter while this object exists. If Python ends during that
+/// time, which can happen under a daemon thread, this thread blocks for ever and does not take the
+/// lock again. Otherwise Python would unwind the thread's stack, which C++ destructors do not
+/// survive.
 class WithoutLock {
  public:
   WithoutLock() : state_(PyEval_SaveThread()) {}
@@ -51,17 +52,17 @@ class WithoutLock {
   PyThreadState* state_;
 };
 
-/// Throws an error that becomes RuntimeError in the child of a fork, where threads and locks of the
-/// parent are unusable. The module calls it first when it is imported.
+/// Throws an error (RuntimeError in Python) in the child of a fork, where threads and locks of the
+/// parent are unusable. The module calls this function first when it is imported.
 void refuse_forked_child();
 
 /// Thrown by work that was stopped.
 class Stopped {};
 
-/// Runs `work` on its own thread without the interpreter's lock and returns its result. Meanwhile
-/// signals are handled and `meanwhile` is called every 50 ms. If either raises, as Ctrl-C does,
-/// sets `stop`, calls `when_stopped` and throws the exception soon after. `work` may still run
-/// then, so it must own all that it uses.
+/// Runs `work` on its own thread without the interpreter's lock and returns its result. Every 50 ms
+/// it handles signals and calls `meanwhile`. If either raises, as Ctrl-C does, it sets `stop`,
+/// calls `when_stopped` and soon throws the exception. `work` may still run then, so it must own
+/// all data that it uses.
 template <class Result>
 Result interruptibly(const std::function<Result(const std::atomic<bool>& stop)>& work,
                      const std::function<void()>& when_stopped = {},

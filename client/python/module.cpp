@@ -25,7 +25,7 @@ void WithoutLock::take() noexcept {
       PyEval_RestoreThread(state_);
       return;
     }
-  } catch (...) {  // pthread_exit, called because Python began to end
+  } catch (...) {  // pthread_exit, called because Python is ending
   }
   while (true) {
     pause();
@@ -43,7 +43,7 @@ void refuse_forked_child() {
 
 }  // namespace oblique::python
 
-/// The extension oblique._core of the package oblique (folder oblique/).
+/// The extension module oblique._core of the package oblique (folder oblique/).
 PYBIND11_MODULE(_core, module) {
   namespace py = pybind11;
   oblique::python::refuse_forked_child();

@@ -42,22 +42,22 @@ py::str text_of(std::string_view text) {
   return {text.data(), text.size()};
 }
 
-/// The outputs of many points as arrays; NaN and no text for a missing value.
+/// The outputs of many points as arrays. A missing number is NaN; a missing text has the index -1.
 class ResultArrays {
  public:
   explicit ResultArrays(std::size_t points);
 
-  /// Not thread-safe; must be called without the interpreter's lock.
+  /// Stores the result of one point. Not thread-safe; call it without the interpreter's lock.
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// Moves the outputs out, by the names of `oblique solve --json`: an array for each number,
-  /// (texts, index of each point's text or -1) for each text, and `error`. `lists` has an array for
-  /// each member of a list, and the `offsets` of the points.
+  /// Moves the outputs into a dict, under the names of `oblique solve --json`: an array for each
+  /// number, (texts, index of each point's text or -1) for each text, and `error`. Under `lists`,
+  /// each list has an array for each of its members, and the `offsets` of the points.
   py::dict dict();
 
  private:
-  /// Texts of many points; equal ones are stored once.
+  /// Texts of many points; equal texts are stored once.
   struct Texts {
     explicit Texts(std::size_t points) : codes(points, -1) {}
     void set(std::size_t point, std::string_view text);
@@ -67,19 +67,19 @@ class ResultArrays {
     std::map<std::string, std::int32_t, std::less<>> known;
     std::vector<std::string> texts;
   };
-  /// One list of many points, in the order of their arrival.
+  /// The elements of one list for many points, in the order in which the points arrive.
   struct Elements {
     const solver::ResultList* list;
-    std::vector<std::uint64_t> begin;  ///< of each point
+    std::vector<std::uint64_t> begin;  ///< index of each point's first element
     std::vector<std::uint32_t> count;
-    /// one per member; a text is stored as the index of its first occurrence in `texts`
+    /// One per member. A text is stored as the index of its first occurrence in `texts`.
     std::vector<std::vector<double>> members;
     std::vector<std::string> texts;
   };
   static double number_of(Elements& elements, const solver::Cell& cell);
   static py::dict dict_of(const Elements& elements);
 
-  std::vector<std::vector<double>> numbers_;  ///< by field; empty for fields of other kinds
+  std::vector<std::vector<double>> numbers_;  ///< by field; empty for fields that are not numbers
   std::map<std::size_t, Texts> texts_;        ///< by field
   std::vector<Elements> lists_;
   Texts errors_;
@@ -159,7 +159,7 @@ double ResultArrays::number_of(Elements& elements, const Cell& cell) {
   return static_cast<double>(place);
 }
 
-// Sorts the elements by points.
+// Sorts the elements by point.
 py::dict ResultArrays::dict_of(const Elements& elements) {
   const std::size_t points = elements.begin.size();
   std::vector<std::int64_t> offsets{0};
@@ -210,10 +210,10 @@ py::dict ResultArrays::dict() {
   return all;
 }
 
-/// Points and their models.
+/// Points with their models.
 struct GivenPoints {
   std::vector<ModelParameters> models;
-  std::vector<std::string> faults;  // of each model; empty: the model is valid
+  std::vector<std::string> faults;  // error of each model; empty if the model is valid
   std::vector<ModelPoint> points;
 };
 
@@ -234,8 +234,9 @@ std::vector<double> values_of(std::string_view key, const py::handle& array) {
   return numbers;
 }
 
-/// Adds a key. One number of the model goes to `model`; a number of a point, a text (expression) or
-/// an array with one value per point goes to `axes`, which are ordered by key_number.
+/// Adds a key. A single number of the model goes to `model`. A number of a point, a text
+/// (expression) or an array with one value per point goes to `axes`, which are ordered by
+/// key_number.
 void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>& axes,
              const std::string& name, const py::handle& value) {
   const std::size_t number = protocol::key_number(name);
@@ -260,7 +261,7 @@ void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>&
   axes[number] = std::move(axis);
 }
 
-/// Adds the model with these values of `keys`, or its error.
+/// Adds the model with these values of `keys`, or the model's error.
 void add_model(GivenPoints& all, std::span<const double> values,
                const std::vector<std::size_t>& keys, const ModelParameters& base) {
   std::string fault;
@@ -297,9 +298,9 @@ std::vector<double> lengths_of(const py::handle& value) {
 }
 
 /// Reads a dict of numbers, texts (expressions), arrays of `points` values, and a list `lengths`.
-/// Throws InputError, with key, value and allowed range, for an unknown key (with the nearest one),
-/// a wrong combination, and a value that is wrong for all points. A wrong value in an array becomes
-/// an error of its model, or of the point when it is solved.
+/// Throws InputError, with key, value and allowed range, for an unknown key (with the nearest known
+/// key), a wrong combination, and a value that is wrong for all points. A wrong value in an array
+/// becomes an error of its model, or an error of the point when that is solved.
 GivenPoints points_of(const py::dict& keys, std::size_t points) {
   protocol::ModelInput model;
   std::map<std::size_t, protocol::Axis> keyed_axes;
@@ -339,7 +340,7 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
   std::map<std::vector<std::uint64_t>, std::size_t> known;  // models by the bits of their values
   all.points.reserve(points);
   const auto add = [&](std::span<const double> values) {
-    std::vector<std::uint64_t> bits;  // also distinguishes NaN
+    std::vector<std::uint64_t> bits;  // unlike numbers, bits can be compared for NaN
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
       bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
     }
@@ -354,7 +355,7 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
   return all;
 }
 
-/// A single point with its model, which can be solved.
+/// Returns one point with its model, ready to be solved.
 GivenPoints one_point(const py::dict& keys) {
   GivenPoints given = points_of(keys, 1);
   if (!given.faults.front().empty()) {
@@ -363,7 +364,7 @@ GivenPoints one_point(const py::dict& keys) {
   return given;
 }
 
-/// The outputs, with H, mu and e.
+/// Returns the outputs with the values of H, mu and e.
 py::dict with_points(ResultArrays& arrays, const std::vector<ModelPoint>& points) {
   py::dict all = arrays.dict();
   const auto column = [&points](double Point::*member) {
@@ -399,7 +400,7 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
   return dict_of(one, result);
 }
 
-/// Instants of a trace: values by instants, and states.
+/// Instants of a trace: the values of each instant, and its state.
 struct Instants {
   CaseResult result;
   std::vector<double> numbers;
@@ -433,7 +434,7 @@ py::tuple trace(const Falls& falls, const py::dict& keys, bool fall, bool shape)
                         array_of(std::move(instants.states)));
 }
 
-/// State of a call of solve_many, shared with its threads, which may outlive the call.
+/// State of a call of solve_many. The threads share it and may outlive the call.
 struct ManyPoints {
   ManyPoints(std::size_t points, GivenPoints with_models)
       : given(std::move(with_models)), arrays(points) {}
@@ -487,7 +488,7 @@ py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
   return with_points(many->arrays, many->given.points);
 }
 
-/// (name, group, column, is_whole, list, member, where) of each output.
+/// Returns (name, group, column, is_whole, list, member, where) of each output.
 py::list fields() {
   py::list all;
   for (const auto& field : solver::result_fields()) {

@@ -18,16 +18,17 @@
 namespace oblique::client {
 namespace {
 
-/// A server counts as unreachable after this silence.
+/// After this time without a message, a server counts as unreachable.
 constexpr std::chrono::milliseconds kSilence{3'000};
 
 std::string seconds_of(std::chrono::milliseconds time) {
   return fmt::format("{} s", solver::exact_number(static_cast<double>(time.count()) / 1000.0));
 }
 
-/// An unsent request must not delay the end of the program. Requests are not queued for an
-/// unreachable server, which would receive every copy later. The embedded service may be started
-/// after the first attempt to connect, so attempts follow quickly.
+/// Socket settings. An unsent request must not delay the end of the program, so it is dropped.
+/// Requests are not queued for an unreachable server, because it would later receive every copy.
+/// Reconnection attempts follow quickly, because the embedded service may start after the first
+/// attempt.
 protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
   return {.url = settings.server_url,
           .example_url = ConnectionSettings().server_url,
@@ -38,14 +39,15 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .key = settings.key};
 }
 
-/// First item of the page after `requested`; 0: none. A page that does not advance would never end.
+/// Returns the first item of the next page, or 0 if `requested` was the last. An answer that does
+/// not advance also gives 0, because otherwise the loop would never end.
 std::uint64_t next_page(std::uint64_t requested, std::uint64_t answered) {
   return answered > requested ? answered : 0;
 }
 
 }  // namespace
 
-/// The stream of an answer in chunks.
+/// Stream of an answer that a server sends in chunks.
 class ServerRows : public RowStream {
  public:
   ServerRows(Connection& connection, protocol::QueryRequest request) : connection_(connection) {
@@ -71,7 +73,7 @@ Connection::Connection(ConnectionSettings settings, KeepWaiting keep_waiting)
 
 bool Connection::is_unsent(const Outstanding& outstanding) {
   const auto connections = monitor_.connections();
-  // A request that an earlier connection delivered may have been lost with it.
+  // A request that was sent over an earlier connection may have been lost with that connection.
   return connections > 0 && outstanding.sent_over != connections;
 }
 
@@ -83,9 +85,9 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
     outstanding.sent = now;
     return;
   }
-  // A silent connection may be broken without either end noticing.
+  // A silent connection may be broken although neither end has noticed.
   const bool has_connected = monitor_.connections() > connections_before_;
-  // The next attempt gets more time: a handshake over a slow network takes seconds.
+  // Each attempt gets more time than the last: a handshake over a slow network takes seconds.
   const auto patience =
       has_connected ? outstanding.resend_after : kSilence * (1U << std::min(failed_attempts_, 2U));
   if (now - std::max(outstanding.sent, connecting_since_) <= patience) {
@@ -107,13 +109,13 @@ void Connection::send_or_connect_again(Outstanding& outstanding) {
 
 void Connection::wait_a_slice(bool to_send) {
   constexpr std::chrono::milliseconds kLongest{50};
-  constexpr std::int64_t kSlices = 5;  // wait for a short time
+  constexpr std::int64_t kSlices = 5;  // number of slices of a short timeout
   const auto slice = std::min(std::chrono::milliseconds(settings_.timeout_ms / kSlices), kLongest);
   if (keep_waiting_ && !keep_waiting_()) {
     throw Interrupted("stopped while waiting for the server");
   }
   const int events = ZMQ_POLLIN | (to_send ? ZMQ_POLLOUT : 0);
-  // The monitor is read first, so that the socket, polled after it, has the same connection.
+  // Polls the monitor before the socket, so that both refer to the same connection.
   std::array<zmq::pollitem_t, 2> items{{{monitor_.handle(), 0, ZMQ_POLLIN, 0},
                                         {socket_.handle(), 0, static_cast<short>(events), 0}}};
   try {
@@ -136,7 +138,7 @@ std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_
         "the reply from {} is not that of an oblique-server: check the address and port",
         settings_.server_url));
   }
-  // A late or second answer to an earlier request is ignored.
+  // Ignores a late or repeated answer to an earlier request.
   const bool is_word_of_it =
       reply.has_still_working() && reply.still_working().request_id() == request_id;
   if (reply.request_id() != request_id && reply.request_id() != 0 && !is_word_of_it) {
@@ -164,7 +166,7 @@ protocol::ClientReply Connection::answer_to(const protocol::ClientRequest& reque
       }
       outstanding.runs = reply->still_working().runs();
       outstanding.word = outstanding.sent = Clock::now();
-      // A trace, or the check of all points of a study, may take long.
+      // A trace, or the check of all points of a study, may take a long time.
       if (tell || request.has_trace() || request.has_submit()) {
         outstanding.heard = outstanding.word;
       }
@@ -210,7 +212,7 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
         "the request has {} bytes; a server takes at most {}: write long lists of values as ranges",
         frame.size(), protocol::kMaxFrameBytes));
   }
-  // A trace may take long, and a new connection would start it again.
+  // A trace may take a long time, and a new connection would make the server start it again.
   const std::chrono::milliseconds resend_after(request.has_trace() ? settings_.timeout_ms
                                                                    : settings_.resend_after_ms);
   auto reply = answer_to(request, {.frame = std::move(frame), .resend_after = resend_after}, tell);
@@ -225,8 +227,7 @@ void Connection::check(const protocol::ClientReply& reply, int kind) const {
   if (reply.has_error()) {
     throw ServerError(reply.error().message());
   }
-  // A reply carries the number of its request's kind. Messages of other programs may decode as
-  // anything.
+  // A reply has the kind number of its request. Messages of other programs may decode as any kind.
   if (static_cast<int>(reply.kind_case()) != kind) {
     throw ConnectionError(
         fmt::format("the reply from {} is not that of an oblique-server to a client: check the "
@@ -270,7 +271,7 @@ protocol::QueryReply Connection::next_rows() {
   if (rows_->chunks > 0) {
     chunk = more_rows();
   } else {
-    // Every call ends the current stream.
+    // Each call ends the current stream.
     Rows rows = *std::exchange(rows_, std::nullopt);
     protocol::ClientRequest request;
     *request.mutable_query() = rows.request;
@@ -298,7 +299,7 @@ protocol::QueryReply Connection::more_rows() {
   request.mutable_more_rows()->set_request_id(rows_->request_id);
   request.mutable_more_rows()->set_received(rows_->chunks);
   send_about_rows(std::move(request));
-  // The time in which this process was stopped or the machine slept does not count.
+  // Time during which this process was stopped or the machine slept does not count.
   constexpr std::chrono::milliseconds kLongestSlice{500};
   const std::chrono::milliseconds timeout(settings_.timeout_ms);
   Clock::duration waited{0};
@@ -319,9 +320,9 @@ protocol::QueryReply Connection::more_rows() {
 
 void Connection::send_about_rows(protocol::ClientRequest request) {
   request.set_protocol_version(protocol::kProtocolVersion);
-  // This request has no reply of its own; errors arrive under the number of the query.
+  // This request has no reply of its own; errors arrive with the request number of the query.
   request.set_request_id(rows_->request_id);
-  // If it cannot be sent, no chunk arrives and the wait times out.
+  // If the request cannot be sent, no chunk arrives and the wait times out.
   (void)socket_.send(zmq::buffer(protocol::encode(request)), zmq::send_flags::dontwait);
 }
 
@@ -362,7 +363,7 @@ std::vector<protocol::StudyStatus> Connection::status(const std::string& study, 
 protocol::StudyStatus Connection::status_of(std::uint64_t study_id, const std::string& name,
                                             const Tell& tell) {
   protocol::ClientRequest request;
-  request.mutable_status()->set_study(name);  // replaces the server's error
+  request.mutable_status()->set_study(name);  // the server's error contains it
   request.mutable_status()->set_study_id(study_id);
   const auto reply = call(std::move(request), tell).status();
   if (reply.studies_size() != 1) {
@@ -423,7 +424,7 @@ namespace {
 constexpr const char* kServerVariable = "OBLIQUE_SERVER";
 constexpr const char* kKeysVariable = "OBLIQUE_KEYS";
 
-/// The server that a flag or the environment names; empty: none.
+/// Returns the server that a flag or the environment names, or an empty text.
 std::string server_named(const SourceFlags& flags) {
   return flags.server.empty() ? environment_variable(kServerVariable).value_or("") : flags.server;
 }

@@ -23,25 +23,25 @@
 
 namespace oblique::client {
 
-/// Address of the server and timeouts.
+/// Address of the server, timeouts and key.
 struct ConnectionSettings {
   std::string server_url{"tcp://127.0.0.1:7600"};
-  std::int64_t timeout_ms = 10'000;  ///< for one answer
-  /// An unanswered request is sent again over a new connection after this time, and again after
-  /// twice this time.
+  std::int64_t timeout_ms = 10'000;  ///< limit for each answer
+  /// Time after which an unanswered request is sent again over a new connection; the time doubles
+  /// with each repetition.
   std::int64_t resend_after_ms = 3'000;
-  std::optional<protocol::KeyFile> key = {};  ///< our key; none: no encryption
-  /// Advice if the server does not answer; empty: that it may not run.
+  std::optional<protocol::KeyFile> key = {};  ///< our key; nothing: the connection is not encrypted
+  /// Advice if the server does not answer. If empty, the error says that the server may not run.
   std::string if_silent = {};
 };
 
-/// The server refused a request or failed; the message is its own.
+/// The server refused a request or failed; the message comes from the server.
 class ServerError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// No readable answer. The message names the remedy.
+/// The server gave no readable answer. The message names the remedy.
 class ConnectionError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -54,21 +54,22 @@ class Interrupted : public std::runtime_error {
 };
 
 struct SubmitSettings {
-  /// Studies of higher priority come first. Not given: an existing study keeps its priority, a new
-  /// one has 0.
+  /// Studies of higher priority are solved first. Without a value, an existing study keeps its
+  /// priority and a new study has 0.
   std::optional<std::int32_t> priority = {};
-  bool no_reuse = false;  ///< also solves points of which another study has the result
+  bool no_reuse = false;  ///< also solves points whose results another study has
 };
 
 /// Sends requests to one server, one at a time. Each call sends one ClientRequest and waits for the
-/// reply with its number. Each throws ServerError, ConnectionError or Interrupted, and
-/// solver::InputError if the server reports a wrong request. Requests are idempotent: an unanswered
-/// one, or one that may be lost because the server died, is sent again, and the first answer
-/// counts. A call with a `tell` has no timeout: it reports once that the server is silent and once
-/// that it answers again. It ends if the server rejects this program, for example its key.
+/// reply with the same number. Throws ServerError, ConnectionError, Interrupted, or
+/// solver::InputError if the server reports a wrong request. Requests are idempotent: a request
+/// without an answer, or lost because the server died, is sent again, and the first answer counts.
+/// A call with a `tell` has no timeout: it reports once that the server is silent and once that the
+/// server answers again. Such a call ends only if the server rejects this program, for example its
+/// key.
 class Connection : public Source {
  public:
-  /// Called many times a second while waiting; false ends the wait. It may throw.
+  /// Called many times a second during a wait. The wait ends if it returns false or throws.
   using KeepWaiting = std::function<bool()>;
 
   /// Connects in the background. Throws solver::InputError for an invalid address.
@@ -78,10 +79,10 @@ class Connection : public Source {
   std::string place() const override { return url(); }
   std::string access() const override { return access_; }
 
-  /// Throws ConnectionError if the connection is lost after the first chunk, or a chunk is missing.
-  /// Any other call ends the stream.
+  /// The stream throws ConnectionError if the connection is lost after the first chunk, or if a
+  /// chunk is missing. Any other call on this object ends the stream.
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override;
-  /// All chunks of an answer. For answers that fit into memory.
+  /// Returns all chunks of an answer. Use it only for answers that fit into memory.
   std::vector<protocol::QueryReply> chunks(protocol::QueryRequest request, const Tell& tell = {});
   using Source::query;
   protocol::Table query(const std::string& sql, const Tell& tell);
@@ -90,15 +91,14 @@ class Connection : public Source {
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) override;
   protocol::StudyStatus status_of(std::uint64_t study_id, const std::string& name,
                                   const Tell& tell) override;
-  /// The same, with information about the server.
+  /// Returns the status of studies, with information about the server.
   protocol::StatusReply full_status(const std::string& study = {}, const Tell& tell = {});
   protocol::WorkersReply workers();  ///< all workers
 
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
-  /// Waits as long as the server reports that it works on the query; the server enforces the time
-  /// limit.
+  /// Waits as long as the server reports that it works on the trace. The server limits the time.
   protocol::TraceReply trace(protocol::TraceRequest trace);
-  /// Changes the study of that name; renaming and deleting also need its number.
+  /// Changes the study called `study`. Renaming and deleting also need its number.
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change,
                                std::uint64_t study_id = 0, const std::string& new_name = {});
   protocol::Recipe describe(const std::string& study);
@@ -107,11 +107,11 @@ class Connection : public Source {
   friend class ServerRows;
   using Clock = std::chrono::steady_clock;
 
-  /// An incomplete answer in chunks.
+  /// Progress of an answer in chunks that is not yet complete.
   struct Rows {
     protocol::QueryRequest request;
-    Tell tell = {};                ///< time of the first chunk
-    std::uint64_t request_id = 0;  ///< true after the first chunk
+    Tell tell = {};                ///< reports waiting for the first chunk
+    std::uint64_t request_id = 0;  ///< valid after the first chunk
     std::uint64_t connection = 0;  ///< connection that delivers the answer
     std::uint64_t chunks = 0;      ///< chunks received
     std::uint64_t rows = 0;        ///< rows received
@@ -121,16 +121,17 @@ class Connection : public Source {
   struct Outstanding {
     std::string frame;
     std::chrono::milliseconds resend_after;  ///< since `sent`
-    Clock::time_point heard = Clock::now();  ///< last message of the server; initially the start
-    Clock::time_point sent = Clock::now();   ///< last sending; initially the start
-    std::uint64_t sent_over = 0;             ///< connection that delivered it; 0: none yet
-    Clock::time_point word = {};             ///< time of the last StillWorking
-    std::optional<bool> runs = {};           ///< its `runs`: the query runs or waits
+    /// Time of the server's last message; initially the start.
+    Clock::time_point heard = Clock::now();
+    Clock::time_point sent = Clock::now();  ///< time of the last sending; initially the start
+    std::uint64_t sent_over = 0;            ///< connection that sent the request; 0: none yet
+    Clock::time_point word = {};            ///< time of the last StillWorking message
+    std::optional<bool> runs = {};  ///< field `runs` of that message: the query runs or waits
   };
 
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
-  /// Throws the server's error as an exception, or an error if the reply does not match a request
-  /// of `kind`.
+  /// Throws the server's error as an exception. Throws ConnectionError if the reply does not match
+  /// a request of `kind`.
   void check(const protocol::ClientReply& reply, int kind) const;
   protocol::ClientReply answer_to(const protocol::ClientRequest& request, Outstanding outstanding,
                                   const Tell& tell);
@@ -138,19 +139,19 @@ class Connection : public Source {
 
   void start_rows(protocol::QueryRequest request, const Tell& tell);
   protocol::QueryReply next_rows();
-  protocol::QueryReply more_rows();  ///< wait for a chunk after the first
+  protocol::QueryReply more_rows();  ///< waits for each chunk after the first
   void end_rows();
   void send_about_rows(protocol::ClientRequest request);
-  /// Throws ConnectionError for an incomplete answer.
+  /// Throws a ConnectionError for an incomplete answer.
   [[noreturn]] void broke_off(const std::string& why) const;
 
-  /// Whether the present connection has not delivered it.
+  /// Whether the request has not been sent over the present connection.
   bool is_unsent(const Outstanding& outstanding);
-  /// Sends it over a new connection, or connects again after a long silence.
+  /// Sends the request over a new connection, or reconnects after a long silence.
   void send_or_connect_again(Outstanding& outstanding);
-  /// Waits for the next message, a connection, or the end of a time slice.
+  /// Waits for the next message or connection, at most for one time slice.
   void wait_a_slice(bool to_send);
-  /// The next message from the server, if it answers request `request_id` or is StillWorking.
+  /// Returns the next message from the server if it answers this request or is StillWorking.
   std::optional<protocol::ClientReply> received(std::uint64_t request_id);
 
   ConnectionSettings settings_;
@@ -158,21 +159,21 @@ class Connection : public Source {
   zmq::context_t context_;
   zmq::socket_t socket_;
   protocol::SocketMonitor monitor_;
-  unsigned attempt_ = 0;          ///< attempts to connect; they alternate address families
+  unsigned attempt_ = 0;          ///< attempts to connect, which alternate address families
   unsigned failed_attempts_ = 0;  ///< attempts since the last successful one
   Clock::time_point connecting_since_ = Clock::now();
-  std::uint64_t connections_before_ = 0;  ///< start of the present attempt to connect
+  std::uint64_t connections_before_ = 0;  ///< number of connections before the present attempt
   std::uint64_t last_request_id_ = 0;
   std::string access_;
   std::optional<Rows> rows_;
 };
 
-/// Values of --db, --server and --timeout.
+/// Values of --db, --server, --keys and --timeout.
 struct SourceFlags {
-  std::string database;             ///< empty: not given
-  std::string server;               ///< empty: not given
-  std::optional<double> timeout_s;  ///< none: the default of the source
-  std::string keys = {};            ///< key file; empty: not given
+  std::string database;             ///< empty if not given
+  std::string server;               ///< empty if not given
+  std::optional<double> timeout_s;  ///< nothing: the default of the source
+  std::string keys = {};            ///< key file; empty if not given
   bool may_be_file = false;         ///< whether the command has --db
 };
 
@@ -181,20 +182,21 @@ void add_server_flags(CLI::App& command, SourceFlags& flags);
 /// Adds --db, --server, --keys and --timeout. `flags` must live as long as `command`.
 void add_source_flags(CLI::App& command, SourceFlags& flags);
 
-/// Adds the database file of a command as --db FILE and as an argument.
+/// Adds the database file of a command, as --db FILE or as an argument without a flag.
 void add_database_argument(CLI::App& command, std::filesystem::path& file);
 
-/// The server that the flags name, else OBLIQUE_SERVER, else the default; the key from the flags'
-/// file, else OBLIQUE_KEYS, else none. Throws solver::InputError for a timeout that is not positive
-/// and an unusable key file.
+/// Returns the settings for a connection. The server is the one that the flags name, else
+/// OBLIQUE_SERVER, else the default; the key is from the file that the flags name, else
+/// OBLIQUE_KEYS, else there is none. Throws solver::InputError for a timeout that is not positive
+/// and for an unusable key file.
 ConnectionSettings connection_settings(Console& console, const SourceFlags& flags);
 
-/// The database that the flags name: --db or, if no server is named, oblique.db in this folder;
-/// empty: use a server.
+/// Returns the database that --db names or, if no server is named either, oblique.db in the current
+/// folder. An empty path means that the command uses a server.
 std::string database_meant(const SourceFlags& flags);
 
-/// Opens the database of `database_meant`, or else the server of `connection_settings`;
-/// `keep_waiting` as for Connection.
+/// Opens the database of `database_meant`, or else the server of `connection_settings`.
+/// `keep_waiting` is the same as in Connection.
 std::unique_ptr<Source> open_source(Console& console, const SourceFlags& flags,
                                     Connection::KeepWaiting keep_waiting = {});
 

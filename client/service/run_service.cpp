@@ -35,9 +35,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A server with a large database first reads its completed points.
+// Startup takes long for a large database, because the server first reads its completed points.
 constexpr std::chrono::seconds kReadyWithin{60};
-// A worker finishes its point, which takes long on fine meshes; the server commits.
+// Before it ends, a worker finishes its point (slow on fine meshes), and the server commits.
 constexpr std::chrono::seconds kStopWithin{5};
 constexpr std::chrono::milliseconds kPause{1};
 
@@ -46,7 +46,7 @@ std::string with_last_output(const std::string& what, const ChildProcess& child)
   return words.empty() ? what : fmt::format("{}; its last output:\n{}", what, words);
 }
 
-/// Waits until no child runs; kills those that still run after `time`.
+/// Waits until all children have ended; kills those that still run after `time`.
 void end_all(const std::vector<std::unique_ptr<ChildProcess>>& children) {
   for (const auto& child : children) {
     child->send(SIGTERM);
@@ -61,8 +61,8 @@ void end_all(const std::vector<std::unique_ptr<ChildProcess>>& children) {
   }
 }
 
-/// The first line that the server writes to `ready`; empty if it closes the pipe first. Throws
-/// ProcessError if no line arrives in time, and Interrupted when `stop` is requested.
+/// Returns the first line that the server writes to `ready`, or an empty text if it closes the pipe
+/// first. Throws ProcessError if no line arrives in time, and Interrupted when `stop` is requested.
 std::string first_line(const Descriptor& ready, const ChildProcess& server,
                        const std::filesystem::path& database, protocol::StopSignals& stop) {
   const auto deadline = Clock::now() + kReadyWithin;
@@ -186,7 +186,7 @@ std::string EphemeralKeys::file_of(protocol::Role role) const {
 }
 
 EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
-  static_cast<void>(sibling_program("oblique-worker"));  // checked before the server starts
+  static_cast<void>(sibling_program("oblique-worker"));  // fails here before the server starts
   start_server(settings, stop);
   for (int i = 0; i < settings.workers; ++i) {
     start_worker(settings);
@@ -210,7 +210,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     child.arguments.emplace_back("--allow-network-disk");
   }
   server_ = std::make_unique<ChildProcess>(child);
-  ready.write.close();  // the server holds the only other end, so we notice when it ends
+  ready.write.close();  // only the server keeps this end open, so the pipe closes when it ends
   const auto urls = nlohmann::json::parse(first_line(ready.read, *server_, settings.database, stop),
                                           nullptr, false);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker")) {
@@ -219,7 +219,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     page_url_ = urls.value("page", std::string());
     return;
   }
-  // It closes the pipe when it ends; then its output is complete.
+  // The server closes the pipe when it ends; its output is then complete.
   const auto deadline = Clock::now() + kStopWithin;
   while (server_->is_running() && Clock::now() < deadline) {
     std::this_thread::sleep_for(kPause);
@@ -229,7 +229,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
 }
 
 void EmbeddedService::start_worker(const ServiceSettings& settings) {
-  // The workers share the cores and the memory for falls.
+  // The workers share the cores, and the memory for cached falls.
   const auto workers = static_cast<unsigned>(settings.workers);
   const unsigned threads = std::max(1U, std::thread::hardware_concurrency() / workers);
   const std::uint64_t all_bytes =

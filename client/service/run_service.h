@@ -22,43 +22,43 @@
 
 namespace oblique::client {
 
-/// Settings of a temporary server with workers.
+/// Settings of a temporary server with its workers.
 struct ServiceSettings {
   std::filesystem::path database;
-  int workers = 1;                      ///< processes, which share the cores
-  bool allow_network_disk = false;      ///< allow a network file system
-  std::string http = "off";             ///< address of the page: ADDRESS:PORT
-  std::uint64_t fall_memory_bytes = 0;  ///< of all workers together; 0: an eighth of the free
+  int workers = 1;                      ///< number of worker processes, which share the cores
+  bool allow_network_disk = false;      ///< permits a database on a network file system
+  std::string http = "off";             ///< address of the web page: ADDRESS:PORT
+  std::uint64_t fall_memory_bytes = 0;  ///< for all workers; 0: an eighth of the free memory
                                         ///< memory
-  std::string only_study{};             ///< solve only this study; empty: all studies
-  bool verbose = false;                 ///< standard error of server and workers goes to ours
+  std::string only_study{};             ///< solves only this study; empty: all studies
+  bool verbose = false;                 ///< server and workers write to our standard error
 };
 
-/// Why a server that was started on the database may not answer; a part of a sentence.
+/// Explains why a server that was started on the database may not answer, as part of a sentence.
 std::string why_silent(const std::filesystem::path& database);
 
 /// Temporary keys in a folder below TMPDIR that only its owner can read.
 class EphemeralKeys {
  public:
-  /// Throws std::runtime_error when they cannot be written.
+  /// Throws std::runtime_error if the keys cannot be written.
   EphemeralKeys();
   ~EphemeralKeys();
   EphemeralKeys(const EphemeralKeys&) = delete;
   EphemeralKeys& operator=(const EphemeralKeys&) = delete;
 
-  /// The key file for a role.
+  /// Returns the key file for a role.
   std::string file_of(protocol::Role role) const;
 
  private:
   std::string folder_;
 };
 
-/// Starts an `oblique-server` on loopback, with ports chosen by the system, and workers; the
-/// destructor ends them all.
+/// Starts an `oblique-server` on loopback, with ports chosen by the system, and workers. The
+/// destructor ends all of them.
 class EmbeddedService {
  public:
-  /// Waits until the server listens, then starts the workers. Throws ProcessError with the last
-  /// output of a process that failed, Interrupted when `stop` is requested.
+  /// Waits until the server listens, then starts the workers. Throws ProcessError, with the last
+  /// output of the process, if one fails, and Interrupted when `stop` is requested.
   EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop);
   ~EmbeddedService() { stop(); }
   EmbeddedService(const EmbeddedService&) = delete;
@@ -66,19 +66,18 @@ class EmbeddedService {
 
   /// Address for clients.
   const std::string& client_url() const { return client_url_; }
-  /// The clients' key, needed because other users of this machine can reach the ports.
+  /// The clients' key. It is needed because other users of this machine can reach the ports.
   protocol::KeyFile client_key() const {
     return protocol::read_key_file(keys_.file_of(protocol::Role::kClient));
   }
-  /// The address of the page with its access token; empty: no page.
+  /// Address of the web page with its access token; empty if there is no page.
   const std::string& page_url() const { return page_url_; }
 
-  /// Throws ProcessError if the server or the last worker has ended.
+  /// Throws ProcessError if the server or all workers have ended.
   void check();
-  /// The last output of workers that ended since the last call; else empty.
+  /// Returns the last output of workers that ended since the previous call, or an empty text.
   std::string news();
-  /// Ends the workers, then the server, which first stores their results. Kills processes that do
-  /// not end in time.
+  /// Ends the workers, then the server, which first stores their results. Kills slow processes.
   void stop();
 
  private:
@@ -94,32 +93,33 @@ class EmbeddedService {
   std::string page_url_;
 };
 
-/// Why the workers of this service cannot solve the rest of a study, with the remedy; else empty.
+/// Explains why the workers of this service cannot solve the remaining points of a study, with the
+/// remedy. Returns an empty text if they can.
 std::string objection_to_waiting(const protocol::StudyStatus& status);
 
-/// How `run` solves a study and `paper` its cases.
+/// Settings for solving a study with a temporary server, for `run` and `paper`.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};
-  bool no_reuse = false;   ///< as in SubmitSettings
-  std::int64_t rows = 30;  ///< number of result rows fetched at the end
+  bool no_reuse = false;   ///< same as SubmitSettings::no_reuse
+  std::int64_t rows = 30;  ///< number of result rows to fetch at the end
 };
 
 /// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `command`.
 void add_worker_flags(CLI::App& command, RunSettings& settings);
 
-/// Throws solver::InputError, with the flag and what is allowed, for a wrong number of workers or
-/// rows.
+/// Throws solver::InputError, with the flag, for a wrong number of workers or rows.
 void check_settings(const RunSettings& settings);
 
 struct RunEnd {
   protocol::StudyStatus status;
-  std::vector<protocol::QueryReply> rows;  ///< chunks of the first results
+  std::vector<protocol::QueryReply> rows;  ///< chunks that contain the first results
   int exit_code;                           ///< kDone if every point is solved
 };
 
 /// Starts server and workers, submits the study, shows its progress, waits for its end, and ends
 /// all processes. When `stop` is requested, prints how to continue and returns nothing. Throws
-/// ProcessError if the server or all workers end early, ServerError if the study is refused.
+/// ProcessError if the server or all workers end early, and ServerError if the server refuses the
+/// study.
 std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop);
 

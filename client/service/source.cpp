@@ -14,7 +14,7 @@
 namespace oblique::client {
 namespace {
 
-/// Returns the result of `call`; turns a wrong statement into wrong usage.
+/// Returns the result of `call`. Turns a StatementError into InputError: users write statements.
 template <class Call>
 auto answered(const Call& call) {
   try {
@@ -40,8 +40,8 @@ class Database : public Source {
   Database(std::string file, std::int64_t timeout_ms) : file_(std::move(file)), reader_(file_) {
     constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
     limits_.time_limit_ms = timeout_ms;
-    sqlite3_hard_heap_limit64(kHeapBytes);  // the whole process, because nothing else in it uses
-                                            // SQLite
+    // The limit holds for the whole process, in which nothing else uses SQLite.
+    sqlite3_hard_heap_limit64(kHeapBytes);
   }
 
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {

@@ -74,7 +74,7 @@ void CsvFile::read_rows(std::string_view text) {
   Row row{line, {}};
   std::string field;
   bool is_quoted = false;      // inside quotes
-  bool follows_quote = false;  // behind the closing quote
+  bool follows_quote = false;  // true after the closing quote
   const auto end_field = [&] {
     row.fields.push_back(trimmed(field));
     field.clear();

@@ -26,7 +26,7 @@ using protocol::BlockKind;
 using solver::InputError;
 using solver::ParameterKey;
 
-/// Parses a number in a flag's text.
+/// Parses a number in the text of a flag.
 double flag_number(std::string_view part) {
   const auto value = solver::number_of(part);
   if (!value) {
@@ -53,7 +53,7 @@ std::optional<std::int64_t> whole_number(std::string_view part) {
                                                                   : std::nullopt;
 }
 
-/// from:to:count, from:to:count:log, from:to:step=STEP, or from:to in a sample.
+/// Parses from:to:count, from:to:count:log, from:to:step=STEP, or in a sample from:to.
 protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, BlockKind kind) {
   constexpr std::string_view kStep = "step=";
   const auto parts = protocol::split(text, ':');
@@ -85,7 +85,8 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
       has_spacing && parts[3] == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
 }
 
-/// @FILE:COLUMN, or @FILE for its only column or the one named as the key.
+/// Parses @FILE:COLUMN. @FILE without a column means the file's only column, or the column with the
+/// name of the key.
 protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, CsvFiles& files) {
   const auto colon = text.rfind(':');
   const CsvFile& file =
@@ -99,7 +100,7 @@ protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, Cs
   return protocol::listed_axis(key, file.values(column, key));
 }
 
-/// normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with FROM or TO optional, uniform(FROM,TO) or
+/// Parses normal(MEAN,SD), normal(MEAN,SD,FROM,TO) with FROM or TO optional, uniform(FROM,TO) or
 /// log-uniform(FROM,TO).
 protocol::Distribution distribution_of_flag(std::string_view text) {
   const auto bracket = text.find('(');
@@ -126,7 +127,7 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   return written;
 }
 
-/// Whether a text is NAME(...), where NAME is a distribution or, in a sample, not a function.
+/// Whether a text is NAME(...) with a distribution or, in a sample, any name but a function's.
 bool is_distribution(std::string_view text, BlockKind kind) {
   const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
   const auto functions = expressions::function_names();
@@ -139,7 +140,7 @@ bool is_distribution(std::string_view text, BlockKind kind) {
   return is_call && (is_in(distributions) || (kind == BlockKind::kSample && !is_in(functions)));
 }
 
-/// Whether a text that is no list of numbers is an expression: it computes or names another key.
+/// Whether a text contains an operation or another key, and is not a list of numbers.
 bool is_expression(std::string_view text) {
   const auto parts = protocol::split(text, ',');
   return !std::all_of(parts.begin(), parts.end(),
@@ -158,7 +159,7 @@ std::vector<double> integrators(std::string_view text) {
   return values;
 }
 
-/// kind:count:seed, or kind:count.
+/// Parses kind:count:seed, or kind:count.
 protocol::Sample sample_of_flag(std::string_view text) {
   const auto parts = protocol::split(text, ':');
   const auto count = parts.size() > 1 ? whole_number(parts[1]) : std::nullopt;
@@ -208,7 +209,7 @@ std::string default_of(const ParameterKey& key) {
   return solver::exact_number(key.get(defaults));
 }
 
-/// Accuracy of presets and other meshes, for help.
+/// Returns a table for the help text, with the accuracy of presets and other meshes.
 std::string table_of_presets() {
   std::vector<std::pair<std::string_view, solver::ModelParameters>> rows;
   for (const std::string_view name : solver::preset_names()) {
@@ -266,8 +267,8 @@ void add_block_flags(CLI::App& command, PointFlags& flags) {
       ->group("Points");
 }
 
-/// Removes the single lengths of 64 links from help; the text of `--lengths` names them. Hidden
-/// flags would have no name in messages.
+/// Formats help without the flags for the single lengths of 64 links, which the text of `--lengths`
+/// names. Hiding the flags would also remove their names from error messages.
 class BriefHelp : public CLI::Formatter {
  public:
   std::string make_group(std::string group, bool is_positional,
@@ -345,7 +346,7 @@ protocol::Axis axis_of_flag(const ParameterKey& key, std::string_view text, Bloc
     if (is_distribution(text, kind)) {
       return protocol::drawn_axis(key, distribution_of_flag(text));
     }
-    // Adds advice to the error of an expression with `a ? b : c`.
+    // Adds advice to the error if the expression contains `a ? b : c`.
     const bool chooses = text.find('?') != std::string_view::npos;
     if (!chooses && text.find(':') != std::string_view::npos) {
       return range_of_flag(key, text, kind);
@@ -372,7 +373,7 @@ Places places_of(const PointFlags& flags) {
 
 namespace {
 
-/// The recipe; its points are not checked yet.
+/// Returns the recipe that the flags define; its points are not checked.
 protocol::Recipe written_recipe(const PointFlags& flags) {
   protocol::ModelInput model;
   model.preset = flags.preset;

@@ -17,7 +17,8 @@ namespace oblique::client {
 
 namespace {
 
-/// The largest H of a block in which all models have the same H; 0 if it depends on the point.
+/// Returns the largest H [m] of a block if all its models have the same values of H, and 0 if the
+/// largest H depends on the point.
 double largest_H_m(const protocol::Block& block, std::uint64_t models) {
   const protocol::Axis& H = *protocol::point_axes(block)[0];
   const bool is_shared =
@@ -57,10 +58,10 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
   }
 }
 
-/// H, or the largest drop if the tip does not reach H. H also if enough falls have been solved.
+/// Returns the drop [m] that the tip reaches, at most H. Assumes H after kMaxFalls solved falls.
 double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m) {
-  constexpr int kCoarse = 2;      // elements per link: nearly the same fall at a small cost
-  constexpr double kRoom = 0.98;  // safety margin of the drop on the coarse mesh
+  constexpr int kCoarse = 2;      // elements per link: cheap, and nearly the same fall
+  constexpr double kRoom = 0.98;  // safety margin for the drop on the coarse mesh
   const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
   if (H_m <= protocol::kSurelyReached * length_m) {
     return H_m;
@@ -77,7 +78,7 @@ double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m)
   if (falling.elements_per_link > kCoarse) {
     solver::ModelParameters coarse = falling;
     coarse.elements_per_link = kCoarse;
-    coarse.dt_fall_s = 0.0;  // steps chosen for the coarse mesh
+    coarse.dt_fall_s = 0.0;  // the solver chooses steps for the coarse mesh
     if (H_m <= kRoom * solved_drop_m(coarse, fall->coarse_drop_m)) {
       return H_m;
     }

@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-/// Elements per link of the coarsest mesh in the study, if no expression defines them.
+/// Returns the elements per link of the coarsest mesh, not counting expressions.
 int coarsest_mesh(const protocol::Recipe& recipe) {
   constexpr int kUnknown = std::numeric_limits<int>::max();
   int coarsest = kUnknown;

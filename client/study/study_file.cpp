@@ -45,7 +45,7 @@ constexpr std::string_view kAxisForms =
     "a number, a list of numbers, { from, to, count }, { from, to, step }, { csv, column }, "
     "{ distribution, ... } or an expression in quotes";
 
-/// Parses a single value; integrators have names.
+/// Parses a single value. An integrator is given by its name.
 double number(const protocol::TomlReader& file, const ParameterKey& key, const toml::node& value,
               std::string_view expected) {
   if (key.name != "integrator") {
@@ -57,7 +57,7 @@ double number(const protocol::TomlReader& file, const ParameterKey& key, const t
   return file.located(value, [&] { return static_cast<double>(solver::integrator_named(name)); });
 }
 
-/// The numbers of a list, all allowed for the key.
+/// Returns the numbers of a list, after checking that each is allowed for the key.
 std::vector<double> numbers(const protocol::TomlReader& file, const ParameterKey& key,
                             const toml::array& list, std::string_view expected) {
   std::vector<double> values;
@@ -223,7 +223,7 @@ class BlockReader {
   }
 
  private:
-  /// Throws if an unknown key is nearer to a key of a block than to an axis.
+  /// Throws if an unknown key resembles a key of a block more than an axis.
   void check_key(const toml::key& key) const {
     if (!protocol::nearest(key.str(), kBlockKeys).empty() && !protocol::is_axis_key(key.str())) {
       file_.fail(key, fmt::format("{}: besides its axes a block has {}",
@@ -273,7 +273,7 @@ class BlockReader {
         whole("count"), parts.contains("seed") ? whole("seed") : protocol::kUsualSeed);
   }
 
-  /// Adds the axes of the file `csv`: the columns in `columns`, or all columns by their own names.
+  /// Adds axes from the file `csv`: the columns named by `columns`, or all under their own names.
   void add_columns(std::vector<protocol::Axis>& axes) const {
     const auto* node = table_.get("csv");
     const auto* columns = table_.get("columns");
@@ -300,7 +300,7 @@ class BlockReader {
     }
   }
 
-  /// Errors are reported for the key `from`.
+  /// Adds an axis from a column of a file. Errors name the key `from`.
   void add_column(std::vector<protocol::Axis>& axes, const CsvFile& csv, std::string_view name,
                   const std::string& column, std::string_view from) const {
     solver::with_key(from, [&] {
@@ -324,7 +324,7 @@ class BlockReader {
   CsvFiles& files_;
 };
 
-/// The study's name: the key `name`, else the name of the file.
+/// Returns the study's name: the key `name`, else the name of the file.
 std::string name_of(const protocol::TomlReader& file, const toml::table& top) {
   const auto* node = top.get("name");
   const std::string name = node != nullptr ? file.text("name", *node, "a string")
@@ -431,7 +431,7 @@ Study read_study_file(const std::filesystem::path& path, const ReachCheck& check
                                      ? fmt::format(" (did you mean `{}`?)", with_ending.string())
                                      : ""));
   }
-  // A recipe has at most 4 MiB. A number takes 8 bytes in it and up to 25 in a file.
+  // A recipe has at most 4 MiB. A number takes 8 bytes in a recipe and up to 25 bytes in a file.
   constexpr std::size_t kMaxBytes = std::size_t{16} << 20U;
   return parse_study(protocol::read_small_file(path.string(), "the study file", kMaxBytes),
                      path.string(), check_reach);
@@ -445,7 +445,7 @@ using solver::exact_number;
 std::string value_of(std::string_view key, double value) {
   return key == "integrator"
              ? toml_string(solver::integrator_names()[static_cast<std::size_t>(value)])
-             : exact_number(value + 0.0);  // zero has no sign
+             : exact_number(value + 0.0);  // adding 0 removes the sign of -0
 }
 
 std::string list_of_values(std::string_view key, const protocol::Axis& axis) {
@@ -509,7 +509,7 @@ bool is_length(std::string_view key) {
   return key == "links" || key == "length";
 }
 
-/// The keys in which a model differs from a preset, as lines of TOML.
+/// Returns the keys in which a model differs from a preset, as lines of TOML.
 std::vector<std::string> overrides(const solver::ModelParameters& model,
                                    const solver::ModelParameters& preset) {
   std::vector<std::string> lines;
@@ -531,8 +531,8 @@ std::vector<std::string> overrides(const solver::ModelParameters& model,
   return lines;
 }
 
-/// [model] with the preset that needs the fewest keys. It is also written if it is the default,
-/// because another version may have another default.
+/// Returns the table [model] with the preset that needs the fewest other keys. The preset is
+/// written even if it is the default, because another version may have another default.
 std::string model_text(const solver::ModelParameters& model) {
   std::string_view best;
   std::vector<std::string> fewest;

@@ -50,7 +50,8 @@ solver::CaseResult solve_with_status(Console& console, const solver::Finger& fin
   return finger.solve(point.H_m, point.mu, point.e_star, tracing);
 }
 
-/// The errors; empty, with a note, if there is no coarser mesh or the point has no answer on it.
+/// Returns the estimated errors. Returns none and prints a note if there is no coarser mesh, or if
+/// the point cannot be solved on the coarser mesh.
 solver::ErrorEstimate estimate_errors(Console& console, const solver::ModelParameters& model,
                                       const PointToSolve& point, const solver::CaseResult& result,
                                       bool shows_status) {
@@ -73,7 +74,7 @@ solver::ErrorEstimate estimate_errors(Console& console, const solver::ModelParam
   throw std::runtime_error(fmt::format("point {} of {} has no answer: {}", point, study, reason));
 }
 
-/// Passes on every K-th instant of the contact, all ends of phases, the fall and the last instant.
+/// Forwards the fall, every K-th instant of the contact, all ends of phases and the last instant.
 class EveryKth {
  public:
   EveryKth(std::uint64_t every, const solver::Tracing::Sink& row) : every_(every), row_(row) {}
@@ -99,7 +100,7 @@ class EveryKth {
  private:
   std::uint64_t every_;
   const solver::Tracing::Sink& row_;
-  std::optional<solver::TraceRow> last_;  // skipped so far
+  std::optional<solver::TraceRow> last_;  // last instant, if it was skipped
   std::string state_before_;
   std::uint64_t instants_ = 0;
 };
@@ -121,8 +122,8 @@ SolvedAgain solve_in_this_process(Console& console, const PointSpec& point,
     return {.point = point, .result = result, .solver = "here"};
   } catch (const solver::SolveError& error) {
     throw_unsolved(point.study, point.point, error.what());
-  } catch (const solver::InputError& error) {  // the study was accepted with this value: not wrong
-                                               // usage
+    // The study was accepted with this value, so it is not wrong usage.
+  } catch (const solver::InputError& error) {
     throw_unsolved(point.study, point.point, error.what());
   }
 }
@@ -158,7 +159,7 @@ PointSpec point_in(const std::string& database, const protocol::StudyStatus& stu
           table.model(values.model)};
 }
 
-/// Requests the point from a server, which does not solve it.
+/// Requests the definition of the point from a server, which does not solve it.
 PointSpec point_at(Connection& connection, const std::string& study, std::uint64_t point) {
   protocol::TraceRequest request;
   request.set_study(study);
@@ -167,7 +168,7 @@ PointSpec point_at(Connection& connection, const std::string& study, std::uint64
   return point_of(study, point, connection.trace(std::move(request)));
 }
 
-/// Throws ConnectionError if the reply is not a trace, ServerError if it is too long.
+/// Throws ConnectionError if the reply is not a trace, and ServerError if it is too long.
 void check_trace(const Connection& connection, const protocol::Trace& trace,
                  const solver::TraceShape& shape, bool with_fall) {
   if (const std::string fault = protocol::fault_of_trace(trace, shape, with_fall); !fault.empty()) {
@@ -246,14 +247,14 @@ StoredRow stored_row(Source& source, const std::string& study, std::uint64_t poi
   return row;
 }
 
-/// The text of a column; empty if it is NULL or missing.
+/// Returns the text of a column; empty if it is NULL or missing.
 std::string text_in(const StoredRow& row, const std::string& column) {
   const auto found = row.find(column);
   const auto* text = found == row.end() ? nullptr : std::get_if<std::string>(&found->second);
   return text == nullptr ? std::string() : *text;
 }
 
-/// A database keeps 8 digits of numbers in lists.
+/// Whether a stored value equals a computed one. Stored lists have only 8 digits of numbers.
 bool is_kept_as(const json& stored, const solver::Cell& cell) {
   constexpr double kHalfOfTheLastDigit = 5.1e-8;
   if (const auto* text = std::get_if<std::string_view>(&cell)) {
@@ -297,9 +298,9 @@ void compare_scalars(const StoredRow& stored, const solver::CaseResult& result,
   });
 }
 
-/// The outputs in which the stored row differs from `result`: "fn_peak_N, mode (stored by solver
-/// 0.1, now solved by 0.2)". Compares all bits of scalars, 8 digits of numbers in lists, and not
-/// `wall_s`. Empty if equal.
+/// Returns the outputs in which the stored row differs from `result`, as "fn_peak_N, mode (stored
+/// by solver 0.1, now solved by 0.2)"; empty if there are none. Compares all bits of scalars and 8
+/// digits of numbers in lists; ignores `wall_s`.
 std::string differences_in_words(const StoredRow& stored, const solver::CaseResult& result) {
   std::vector<std::string> columns;
   compare_scalars<double>(stored, result, columns);
@@ -348,7 +349,7 @@ ReachCheck tip_reach(Console& console) {
 double largest_drop_m(const solver::Finger& finger, StatusLine& line) {
   const auto falling = line.begin([&finger] {
     const auto& model = finger.model();
-    double length_m = 0.0;  // near the length of the chain the tip turns back
+    double length_m = 0.0;  // the tip turns back when the drop is about the length of the chain
     for (const double each_m : model.lengths_m) {
       length_m += each_m;
     }
@@ -398,7 +399,7 @@ SolvedAgain solve_again(Console& console, const PointSource& from, const std::st
     }
   }
   const auto stored = stored_row(*source, study, point);
-  if (text_in(stored, "status") == "failed") {  // it may also crash this process
+  if (text_in(stored, "status") == "failed") {  // solving it here may also crash this process
     throw std::runtime_error(
         fmt::format("point {} of {} failed and has no trace: {}. `oblique retry {}` solves it "
                     "again; `oblique solve --trace` with its values shows where it fails",
@@ -427,7 +428,7 @@ std::vector<solver::TraceRow> take_fall(std::vector<solver::TraceRow>& rows) {
 
 namespace {
 
-/// Writes each instant as a line of CSV.
+/// Appends one instant as a line of CSV.
 void append_csv_row(std::string& text, const solver::TraceRow& row) {
   std::string_view separator;
   const auto put = [&](double value) {

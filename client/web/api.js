@@ -1,8 +1,10 @@
-// Requests to the server. server/web/page/README.md describes paths and fields.
+// Sends requests to the server. server/web/page/README.md describes paths and fields.
 
 export const retryMs = 3000;
 
-/** Errors have the HTTP status, or isSilence if there was no answer. */
+/**
+ * Creates an error. `status` is the HTTP status; `isSilence` means that the server did not answer.
+ */
 const failure = (text, fields) => Object.assign(new Error(text), fields);
 
 async function request(path, options) {
@@ -33,8 +35,8 @@ export async function post(path, body = {}, signal = undefined) {
 }
 
 /**
- * Reads binary numbers after a JSON head. Returns the head, all bytes, and the offset of the
- * numbers.
+ * Reads an answer of binary numbers that follow a JSON head. Returns the head, all bytes, and the
+ * offset of the numbers.
  */
 export async function numbers(path, signal) {
   const bytes = await (await request(path, { signal })).arrayBuffer();
@@ -45,7 +47,9 @@ export async function numbers(path, signal) {
 
 export const session = () => json("/api/session");
 
-/** Receives overviews of the server while the page is visible. */
+/**
+ * Receives the server's overview (studies and workers) again and again while the page is visible.
+ */
 export function follow({ take, say, reconnected }) {
   let source = null;
   let timer = 0;

@@ -1,6 +1,6 @@
-// Shows the view that belongs to the address. A view is a function that fills an element and
-// returns its handlers: `take` receives an overview of the server, `goTo` another address of the
-// same path; further `reconnected` and `close`.
+// Shows the view that the address of the page names. A view is a function that fills an element and
+// returns its handlers: `take` receives the server's overview, `goTo` another address with the same
+// path; `reconnected` and `close` are optional.
 import { follow, retryMs, session } from "./api.js";
 import { h } from "./lib/dom.js";
 import { newStudyView } from "./newStudy.js";
@@ -25,10 +25,13 @@ let now = null;
 let rights = {};
 let turn = 0;
 let leaving = new AbortController();
-/** The last address of each view. */
+/** The latest address of each view. */
 const addresses = new Map();
 
-/** Browsers refuse more than a few hundred changes of the address in ten seconds. */
+/**
+ * Minimum time between changes of the address, because browsers refuse more than a few hundred
+ * changes in ten seconds.
+ */
 const writeEveryMs = 150;
 let unwritten = "";
 let timer = 0;
@@ -49,7 +52,9 @@ function writeSoon() {
   }, writeEveryMs);
 }
 
-/** Writes the state of a view into its address. The browser's Back undoes a step. */
+/**
+ * Writes the state of a view into its address. With `isStep`, the browser's Back undoes the change.
+ */
 function keep(of, fields, isStep) {
   const address = `#${of}${String(fields) && `?${fields}`}`;
   addresses.set(of, address);
@@ -69,7 +74,7 @@ function showTrail(parts) {
   document.title = last ? `${last.textContent ?? last} – oblique` : "oblique";
 }
 
-/** Functions and data that a view may use while it is shown. */
+/** Returns functions and data that a view may use while it is shown. */
 function placeOf(mine, own, fields, signal) {
   const whileShown =
     (act) =>
@@ -162,9 +167,9 @@ async function begin() {
     },
   });
   addEventListener("popstate", show);
-  // The address must be up to date before a click follows a link or copies it.
+  // Updates the address before a click follows or copies a link.
   document.addEventListener("click", writeAddress, { capture: true });
-  // Canvases must be drawn again in the new colours.
+  // A change of the colour scheme requires redrawing all canvases.
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     writeAddress();
     if (!path.startsWith("/study/")) return;

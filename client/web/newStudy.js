@@ -1,5 +1,5 @@
-// The form for a new study: values as on the command line, the size computed by the server, and the
-// equivalent command.
+// The form for a new study. It takes values as on the command line, and shows the study's size,
+// which the server computes, and the equivalent command.
 import { post } from "./api.js";
 import { command, h, labelled, picker } from "./lib/dom.js";
 import { count, counted, dbFlag, quoted, withUnit } from "./lib/format.js";
@@ -25,7 +25,8 @@ function numberOf(key, text) {
 }
 
 /**
- * Parses an axis: 0.4 or 0.4,0.6 or FROM:TO:COUNT or FROM:TO:COUNT:log; in a sample also FROM:TO.
+ * Parses an axis: 0.4 or 0.4,0.6 or FROM:TO:COUNT or FROM:TO:COUNT:log; in a random sample also
+ * FROM:TO.
  */
 function axisOf(key, text, isSample) {
   const [from, to, number, ...spacing] = text.split(":");
@@ -44,7 +45,7 @@ function axisOf(key, text, isSample) {
   return { key, ...range(), count: numberOf(key, number), ...isLog };
 }
 
-/** Parses KIND:COUNT:SEED, as in --sample; undefined: a grid. */
+/** Parses KIND:COUNT:SEED, as in --sample; returns undefined for a grid. */
 function sampleOf(text) {
   if (text === "") return undefined;
   const [kind, number, seed = "1", ...more] = text.split(":");
@@ -56,7 +57,7 @@ function sampleOf(text) {
   return { kind: samples[kind], count: size, seed: start };
 }
 
-/** Model keys without their own field: [key, text]. */
+/** Returns [key, text] for the model keys that have no field of their own. */
 function otherKeys(form) {
   const lines = form.others.split("\n").map((line) => line.trim());
   return lines.filter(Boolean).map((line) => {
@@ -71,7 +72,7 @@ function submissionOf(form) {
   if (name === "") throw new Error("the study needs a name");
   const sample = sampleOf(form.sample);
   const axis = ([key, text]) => axisOf(key, text, sample !== undefined);
-  // Single values belong to the model, as with flags. Axes of the model come first, sorted by name.
+  // Single values belong to the model, as with flags. Axes of model keys come first, by name.
   const others = otherKeys(form).map(axis);
   const isSingle = (one) => one.values?.length === 1 && !/^length\d/.test(one.key);
   const varied = others.filter((one) => !isSingle(one)).sort((a, b) => (a.key < b.key ? -1 : 1));
@@ -81,7 +82,7 @@ function submissionOf(form) {
   return { name, model: { preset, ...model }, recipe: { blocks: [block] } };
 }
 
-/** The form as flags of a command. */
+/** Returns the contents of the form as flags of a command. */
 function flagsOf(form) {
   const flag = (name, value) => (value === "" ? [] : [`--${name.replaceAll("_", "-")}`, value]);
   const all = [
@@ -99,7 +100,7 @@ function shownBytes(bytes) {
   return `${size < 10 ? size.toFixed(1) : count(size)} ${["", "kB", "MB", "GB"][power]}`;
 }
 
-/** The server's answer to `/api/check` as a sentence. */
+/** Formats the server's answer to `/api/check` as a sentence. */
 function sizeOf({ points, is_counted, models, falls, falls_estimated, bytes, surely_reached_m }) {
   const about = (isEstimate) => (isEstimate ? "about " : "");
   const size =

@@ -1,4 +1,4 @@
-// Studies and workers, live.
+// The view of studies and workers, updated live.
 import { json, post, retryMs } from "./api.js";
 import { button, h, setChildren, statusLine } from "./lib/dom.js";
 import { count, counted, timeLeft } from "./lib/format.js";
@@ -16,7 +16,7 @@ const changes = {
   done: [],
 };
 
-/** Buttons that change the state of a study; `say` shows the result. */
+/** Creates the buttons that change the state of a study; `say` shows the result. */
 export function studyButtons({ id, name, state, failed }, say) {
   const change = async (what) => {
     if (what === "cancel" && !confirm(`Cancel ${name}? Solved points stay.`)) return;
@@ -35,7 +35,7 @@ export function studyButtons({ id, name, state, failed }, say) {
   return h("span.buttons", ...wanted);
 }
 
-/** Number of points that are solved, failed or left out by a filter. */
+/** Returns the number of points that are solved, failed or left out by a filter. */
 export const completed = (study) => study.solved + study.failed + study.left_out;
 
 export function progressOf(study) {
@@ -49,7 +49,7 @@ export function progressOf(study) {
   return h("span.share", bar, `${percent} %`);
 }
 
-/** A table that is updated; headings of numeric columns begin with #. */
+/** Creates a table whose rows can be updated. Headings of numeric columns begin with #. */
 function liveTable(caption, heads) {
   const kind = (i) => (heads[i].startsWith("#") ? "number" : "");
   const head = (name, i) => h("th", { scope: "col", class: kind(i) }, name.replace("#", ""));
@@ -106,7 +106,7 @@ const workerCells = (worker) => [
   h("span.weak", `${worker.solver_version}, ${worker.instruction_set}`),
 ];
 
-/** Studies whose name contains a text: running ones first, then the newest. */
+/** Returns the studies whose name contains a text: running ones first, then the newest. */
 function inOrder(studies, text) {
   const rank = { running: 0, paused: 1 };
   return studies
@@ -114,7 +114,7 @@ function inOrder(studies, text) {
     .sort((a, b) => (rank[a.state] ?? 2) - (rank[b.state] ?? 2) || b.id - a.id);
 }
 
-/** Reads all studies, a page at a time. */
+/** Reads all studies, page by page. */
 async function readStudies(signal) {
   const found = new Map();
   for (let after = 0; found.size < mostRead;) {
@@ -190,7 +190,7 @@ export function overview(root, place) {
         : "";
   }
 
-  /** Reads all studies again; only one reading at a time. */
+  /** Reads all studies again. A call during a running read repeats the read afterwards. */
   async function read() {
     wantsAnother = true;
     if (isReading) return;
@@ -219,8 +219,8 @@ export function overview(root, place) {
       now = update;
       if (update.is_stopping) say("The server is stopping.");
       for (const study of update.studies) studies.set(study.id, study);
-      // Events contain only some studies. The others are read when a state changes, or every few
-      // seconds.
+      // An update contains only some studies. The others are read when the state of a study
+      // changes, or every few seconds.
       const isOld = update.unlisted > 0 && performance.now() - readAt > retryMs;
       const changed = JSON.stringify(update.studies_by_state);
       if (changed !== states || isOld) read();

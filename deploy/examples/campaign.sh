@@ -1,8 +1,9 @@
 #!/bin/sh
-# Runs a study on a Slurm cluster from its login node: a server here, and jobs with workers while
-# points are open. After Ctrl-C the same command continues.
-# sh campaign.sh STUDY.toml [MOST-JOBS]
-# HOST is this machine's name for the nodes; the database must not be on a network disk.
+# Runs a study on a Slurm cluster from its login node: starts a server on this node, and jobs with
+# workers while points are open. After Ctrl-C the same command continues the study.
+#   sh campaign.sh STUDY.toml [MOST-JOBS]
+# HOST is the name under which the nodes reach this machine. The database must not be on a network
+# disk.
 set -eu
 file=${1:?"sh campaign.sh STUDY.toml [MOST-JOBS]"} most=${2:-4}
 host=${HOST:-$(hostname)}
@@ -11,7 +12,7 @@ client_port=${OBLIQUE_SERVER_CLIENT_PORT:-7600} worker_port=${OBLIQUE_SERVER_WOR
 # Creates keys on the first run, so that nobody else on the cluster can read or write results.
 [ -d keys ] || oblique keygen keys
 
-# The server ends with this script, after the jobs.
+# When this script ends, it ends the jobs first and then the server.
 oblique-server --listen '*' --keys keys/server.key --db campaign.db 2> server.log &
 server=$!
 export OBLIQUE_SERVER="tcp://$host:$client_port" OBLIQUE_KEYS="$PWD/keys/client.key"
@@ -21,7 +22,7 @@ end() {
   code=$?
   [ "$code" = 0 ] || tail -n 3 server.log >&2
   [ -z "$scaling" ] || kill "$scaling" 2> /dev/null || true
-  # Workers deliver their results before their job ends.
+  # Cancelled workers deliver their results before they end.
   scancel --quiet --name="$jobs" || true
   while [ -n "$(squeue --noheader --me --name="$jobs")" ]; do sleep 1; done
   kill "$server" 2> /dev/null || true
@@ -31,7 +32,7 @@ trap end EXIT
 trap 'exit 130' INT
 trap 'exit 143' TERM
 
-# Commands wait up to 10 s for a server that does not answer yet.
+# `oblique` waits up to 10 s for the server, which may not answer yet.
 study=$(basename "$file" .toml)
 oblique submit "$file" --name "$study"
 

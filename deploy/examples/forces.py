@@ -2,7 +2,7 @@
 import sqlite3
 import sys
 
-# Read-only, because a server may use the file.
+# Opens the file read-only, because a server may use it.
 database = sqlite3.connect(f"file:{sys.argv[1]}?mode=ro", uri=True)
 rows = database.execute(
     "SELECT H, mu, fn_peak_N, max(e) FROM runs"

@@ -3,7 +3,7 @@
 Cells begin with # %%: editors as VS Code, Spyder and Jupyter (jupytext) run them one by one. As a script:
   python3 paper_figures.py           writes figure4.png ... figure7.png and prints a table
 """
-# %% Groups of the paper: one quantity is varied, all else is H = 1 m, mu = 0.4, e* = 1
+# %% Groups of the paper: each varies one quantity; the others are H = 1 m, mu = 0.4, e* = 1
 import matplotlib
 matplotlib.use("Agg")  # remove this line in a notebook
 import numpy as np
@@ -19,8 +19,9 @@ GROUPS = {
 }
 VARIED = [0, 2, 1, 1]  # which of H, mu and e
 
-# Tab. 2 [kN]: normal forces, then tangential ones, of each peak; by (H, mu, e). The columns of H = 0.96 and
-# 1.04 m are misprinted: they repeat others, and what stands under 1.00 m belongs to 1.04 m.
+# Tab. 2 [kN] by (H, mu, e): normal forces of all peaks, then tangential forces. The columns of H =
+# 0.96 and 1.04 m are misprinted: they repeat other columns, and the numbers under 1.00 m belong to
+# 1.04 m.
 PUBLISHED = {
     (1.00, 0.4, 0.6): ([5.07, 1.80, 2.77], [2.03, 0.72, 1.11]),
     (1.00, 0.4, 0.8): ([5.07, 1.73, 2.57], [2.03, 0.70, 1.03]),
@@ -33,15 +34,15 @@ PUBLISHED = {
     (1.00, 1.6, 1.0): ([4.28, 1.42], [4.96, 2.26]),
 }
 
-# Section 4.3: how long the tip sticks at first [ms].
+# Section 4.3: duration of the initial stick [ms].
 STICK_MS = {(1.0, 1.2, 1.0): 0.070, (1.0, 1.4, 1.0): 0.083, (1.0, 1.6, 1.0): 0.092}
 
-# %% Solve: time histories, a tenth of a second for the fall and then a millisecond each
+# %% Solves the time histories: the fall takes 0.1 s, each contact after it 1 ms
 points = sorted({point for group in GROUPS.values() for point in group})
 contacts = {point: oblique.trace(*point, preset="paper") for point in points}
 
 
-# %% Four panels a figure, one a group
+# %% Draws four panels per figure, one for each group
 def figure(number, title, xlabel, ylabel, draw):
     sheet, panels = pyplot.subplots(2, 2, figsize=(11, 6.5), layout="constrained")
     for axes, (name, group), varied in zip(panels.flat, GROUPS.items(), VARIED):
@@ -61,7 +62,7 @@ def mark(axes, x, y, colour):
 def forces(axes, contact, point, colour, label):
     axes.plot(contact.t_s * 1e3, contact.fn_N / 1e3, colour, label=label)
     axes.plot(contact.t_s * 1e3, contact.ft_N / 1e3, colour, linestyle="--")
-    # A published peak has no time: it stands at that of ours.
+    # The paper gives no times of peaks, so its peaks are drawn at the times of our peaks.
     for force, published in zip((contact.fn_N, contact.ft_N), PUBLISHED.get(point, ([], []))):
         for t, kN in zip(peak_times(contact, force, len(published)), published):
             mark(axes, t * 1e3, kN, colour)
@@ -88,7 +89,7 @@ figure(7, "trajectory of the fingertip", "x [mm]", "y + H [mm]",
        lambda axes, contact, point, colour, label: axes.plot(
            (contact.x_m - contact.x_m[0]) * 1e3, (contact.y_m + point[0]) * 1e3, colour, label=label))
 
-# %% The table: largest forces, all points side by side
+# %% Prints a table of the largest forces at all points
 H, mu, e = np.array(list(PUBLISHED)).T
 ours = oblique.solve_many(H=H, mu=mu, e=e, preset="paper")
 print("   H   mu   e*   F_n [kN] published  F_t [kN] published")

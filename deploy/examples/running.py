@@ -13,7 +13,7 @@ import pandas
 from matplotlib import pyplot
 
 file, study = sys.argv[1:3]
-# Read-only: the server continues writing; each connection sees the state at one instant.
+# Opens the file read-only. The server keeps writing; each connection sees the state at one instant.
 database = sqlite3.connect(f"file:{file}?mode=ro", uri=True)
 
 

@@ -1,17 +1,17 @@
 #!/bin/sh
-# Submits a study, waits for it and queries it. Needs a server and a worker, for example
+# Submits a study, waits until it is solved and queries it. Needs a server and a worker, for example
 #   oblique-server & oblique-worker &
-# and OBLIQUE_SERVER (with keys also OBLIQUE_KEYS) if they run elsewhere.
+# If the server runs on another machine, set OBLIQUE_SERVER and, with keys, OBLIQUE_KEYS.
 # sh study.sh NAME
 set -eu
 study=${1:?"sh study.sh NAME"}
 export OBLIQUE_SERVER="${OBLIQUE_SERVER:-tcp://127.0.0.1:7600}"
 
-# Submitting it again continues the same study; with more points it grows.
+# Submitting the same study again continues it; with more points it grows.
 oblique submit --name "$study" --H 1 --mu 0.2:1.6:8 --e 0.8,1 --quiet
 
-# Waits for the end. 0: all points are solved. 1: some are not. 130: Ctrl-C, and the study
-# continues.
+# Waits for the end. Exit codes: 0 all points are solved, 1 some are not, 130 after Ctrl-C, when the
+# study continues.
 code=0
 oblique watch "$study" --quiet || code=$?
 if [ "$code" = 1 ]; then

@@ -6,7 +6,7 @@ if(DEFINED ENV{OBLIQUE_PREFIX})
   set(prefix "$ENV{OBLIQUE_PREFIX}")
 endif()
 cmake_path(ABSOLUTE_PATH bin_folder BASE_DIRECTORY "${prefix}" OUTPUT_VARIABLE OBLIQUE_BIN)
-# An installation in /usr is configured in /etc; any other in its prefix.
+# An installation in /usr has its configuration in /etc; any other has it below its prefix.
 set(configuration "${CMAKE_INSTALL_PREFIX}/etc/oblique")
 set(OBLIQUE_ETC "${prefix}/etc/oblique")
 if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
@@ -21,7 +21,7 @@ function(fill_in template folder name)
   configure_file("${template}" "$ENV{DESTDIR}${folder}/${name}" @ONLY NO_SOURCE_PERMISSIONS NEWLINE_STYLE LF)
 endfunction()
 
-# install_filled_in(TEMPLATE FOLDER NAME): also adds it to the manifest.
+# install_filled_in(TEMPLATE FOLDER NAME): like fill_in, and adds the file to the manifest.
 macro(install_filled_in template folder name)
   fill_in("${template}" "${folder}" "${name}")
   list(APPEND CMAKE_INSTALL_MANIFEST_FILES "${folder}/${name}")
@@ -40,7 +40,8 @@ else()
                     oblique-server.conf)
 endif()
 
-# Edited configuration stays, also when the other files are removed by the manifest.
+# An existing configuration is not overwritten. It is not in the manifest, so removing the files of
+# the manifest keeps it, too.
 if(NOT EXISTS "$ENV{DESTDIR}${configuration}/${part}.toml")
   fill_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
 endif()

@@ -1,6 +1,6 @@
-# The solver for other programs, in two parts as in Debian: `library` to run with, `development` to
-# build with. find_package(oblique) provides oblique::solver in any prefix. Optional, so that
-# installing works when only the programs were built.
+# Installs the solver for use by other programs, in two parts like Debian's packages: `library` to
+# run programs, `development` to build them. find_package(oblique) provides oblique::solver in any
+# prefix. This part is optional, so that installing works when only the programs were built.
 install(TARGETS oblique_shared EXPORT oblique-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library OPTIONAL NAMELINK_COMPONENT development)
 set(solver_folder ${PROJECT_SOURCE_DIR}/worker/solver/library)
@@ -17,6 +17,6 @@ cmake_path(RELATIVE_PATH CMAKE_SOURCE_DIR BASE_DIRECTORY ${CMAKE_SOURCE_DIR}/${p
 configure_file(${solver_folder}/oblique.pc.in oblique.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/oblique.pc DESTINATION ${pkgconfig_folder} COMPONENT development)
 
-# An example program.
+# The example program for users of the library.
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/tests/deploy/consumer
         DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/liboblique-dev/examples COMPONENT development)

@@ -1,5 +1,5 @@
-# Packages by cpack: an archive that runs in any folder, and Debian packages. deploy/package calls
-# it.
+# Settings of cpack for an archive that runs in any folder, and for Debian packages. deploy/package
+# runs cpack.
 set(CPACK_PACKAGE_NAME oblique)
 set(CPACK_PACKAGE_VENDOR oblique)
 set(CPACK_PACKAGE_CONTACT "the oblique authors <maintainers@oblique.example>")
@@ -28,8 +28,8 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 
 include(${CMAKE_CURRENT_LIST_DIR}/descriptions.cmake)
-# Allows packages of any architecture to depend on it. cpack has no such field, so it is put into
-# the next line.
+# Multi-Arch: foreign allows packages of any architecture to depend on this package. cpack has no
+# setting for this field, so the text of the field `Section` contains it as a second line.
 set(foreign "science\nMulti-Arch: foreign")
 set(scripts ${CMAKE_CURRENT_BINARY_DIR}/debian)
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME oblique-server)
@@ -51,9 +51,9 @@ set(CPACK_OBLIQUE_LIBDIR ${CMAKE_INSTALL_LIBDIR})
 set(CPACK_OBLIQUE_MULTIARCH ${CMAKE_LIBRARY_ARCHITECTURE})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME ${package_of_library})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION "libs\nMulti-Arch: same")
-# packing/debian_library.cmake reads it.
+# packing/debian_library.cmake sets the dependencies instead.
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS OFF)
-# Programs built with it run with any release of the same SONAME that is not older.
+# A program built with the library runs with any release of the same SONAME that is not older.
 file(CONFIGURE OUTPUT debian/library/shlibs CONTENT "liboblique ${abi} ${package_of_library} (>= ${PROJECT_VERSION})\n")
 file(CONFIGURE OUTPUT debian/library/triggers CONTENT "activate-noawait ldconfig\n")
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${scripts}/library/shlibs ${scripts}/library/triggers)

@@ -1,4 +1,4 @@
-# The Python module, if it was built, in the folder where Debian's Python in /usr finds it.
+# Installs the Python module, if it was built, in the folder where Debian's Python in /usr finds it.
 if(OBLIQUE_PYTHON_MODULE)
   set(python_folder lib/python3/dist-packages/oblique)
   install(TARGETS oblique_python LIBRARY DESTINATION ${python_folder} COMPONENT python OPTIONAL)

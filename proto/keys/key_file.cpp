@@ -37,7 +37,7 @@ constexpr std::string_view kDigits =
 constexpr std::size_t kBytesOfGroup = 4;
 constexpr std::size_t kDigitsOfGroup = 5;
 
-/// False if `text` does not encode a key.
+/// Returns false if `text` does not encode a key.
 bool decode_z85(std::string_view text, CurveKey& key) {
   if (text.size() != kKeyCharacters) {
     return false;
@@ -100,7 +100,7 @@ CurveKey public_key_of(const SecretKey& secret_key) {
   return public_key;
 }
 
-// Four bytes and five digits each form one big-endian number.
+// Z85 writes each big-endian number of four bytes as five digits, the most significant first.
 std::string z85(const CurveKey& key) {
   std::string text(kKeyCharacters, '0');
   for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
@@ -132,7 +132,7 @@ constexpr std::array<std::string_view, 1> kListFields{"key"};
 constexpr std::string_view kNameRule =
     "has 1 to 64 letters, digits or . _ - @, and begins with a letter or digit";
 
-/// The fields of one table of a file. Errors never show a value, which may be a secret.
+/// Reads the fields of one table of a file. Errors never show a value, because it may be a secret.
 class KeyFields {
  public:
   KeyFields(const TomlReader& file, const toml::table& table, Fields known)
@@ -180,7 +180,7 @@ class KeyFields {
   throw std::runtime_error(fmt::format("{} {}: {}", what, path, std::strerror(errno)));
 }
 
-/// Returns the status of a file, all zero if it does not exist.
+/// Returns the status of a file. If the file does not exist, all members are zero.
 struct stat status_of(const std::string& path) {
   struct stat file {};
   static_cast<void>(::stat(path.c_str(), &file));
@@ -200,7 +200,7 @@ Descriptor opened_folder_of(const std::string& path) {
   return opened;
 }
 
-/// Writes a new file of mode 0600 and syncs it and its folder; deletes the file on failure.
+/// Writes a new file of mode 0600, and syncs it and its folder. Deletes the file if that fails.
 void write_new_file(const std::string& path, std::string_view text) {
   const Descriptor file(
       ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnersAlone));
@@ -215,7 +215,7 @@ void write_new_file(const std::string& path, std::string_view text) {
   static_cast<void>(::fsync(opened_folder_of(path).number()));
 }
 
-/// Throws if the mode of the file or folder has one of the bits `refused`.
+/// Throws if the mode of the file or folder contains any of the bits `refused`.
 void refuse_mode(const std::string& path, mode_t refused, std::string_view risk,
                  std::string_view remedy) {
   if (const mode_t mode = status_of(path).st_mode; (mode & refused) != 0) {
@@ -225,7 +225,7 @@ void refuse_mode(const std::string& path, mode_t refused, std::string_view risk,
 }
 
 /// Returns the secret key and overwrites it with zeros in `text`, because a parser leaves copies of
-/// its text in memory. Returns nothing unless a line begins with `secret = "KEY"`.
+/// its text in memory. Returns nothing if no line begins with `secret = "KEY"`.
 std::optional<SecretKey> take_secret(std::string& text) {
   const std::size_t line = text.starts_with("secret") ? 0 : text.find("\nsecret");
   const std::size_t quote = text.find_first_of("\"'", line);
@@ -287,7 +287,7 @@ void write_key_file(const std::string& path, const KeyFile& key) {
     std::string text = {};
     ~Wiped() { sodium_memzero(text.data(), text.size()); }
   };
-  // a growing string would leave copies of the secret key in memory
+  // Memory is reserved, because a growing string would leave copies of the secret key in memory.
   constexpr std::size_t kLongest = 1024;
   const Wiped secret{z85(key.pair.secret_key.bytes())};
   Wiped file;
@@ -377,7 +377,7 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
 
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change) {
-  // Replaces the target of a symbolic link, because other links may point to it.
+  // Replaces the target of a symbolic link, because other links may point to the target.
   const std::string target = std::filesystem::weakly_canonical(path);
   const Descriptor folder = opened_folder_of(target);
   if (::flock(folder.number(), LOCK_EX) != 0) {
@@ -387,9 +387,9 @@ void change_authorized_keys(const std::string& path,
   AuthorizedKeys keys = exists(target) ? read_authorized_keys(path) : AuthorizedKeys();
   change(keys);
   const std::string draft = target + ".new";
-  ::unlink(draft.c_str());  // left by a process that was killed
+  ::unlink(draft.c_str());  // a process that was killed may have left it
   write_new_file(draft, text_of(keys));
-  // A server of another user must still be able to read it.
+  // Keeps owner and mode, because a server of another user must still be able to read the file.
   const bool has_owner_and_mode =
       before.st_mode == 0 || (::chown(draft.c_str(), before.st_uid, before.st_gid) == 0 &&
                               ::chmod(draft.c_str(), before.st_mode & 07777U) == 0);

@@ -11,20 +11,20 @@
 #include <vector>
 
 // Key files (TOML; README.md describes them). Errors are solver::InputError with file, line and
-// key, and never contain a secret.
+// key. They never contain a secret.
 namespace oblique::protocol {
 
 /// One half of a CURVE key pair (Curve25519): 32 bytes.
 using CurveKey = std::array<std::uint8_t, 32>;
 
-/// Characters of a key in files and in ZeroMQ's options (Z85, rfc.zeromq.org 32).
+/// Number of characters of a key in files and in ZeroMQ's options (Z85, rfc.zeromq.org 32).
 inline constexpr std::size_t kKeyCharacters = 40;
 
 /// A secret key in memory that is locked (within RLIMIT_MEMLOCK), excluded from core dumps, and
 /// wiped by the destructor. Copies share the memory.
 class SecretKey {
  public:
-  /// All zero. Throws std::runtime_error if the system refuses such memory.
+  /// Creates a key of zeros. Throws std::runtime_error if the system refuses such memory.
   SecretKey();
 
   const CurveKey& bytes() const { return *bytes_; }
@@ -42,7 +42,7 @@ enum class Role {
   kReader,  ///< may only read at the clients' port
 };
 
-/// "server", "client", "worker" or "reader".
+/// Returns "server", "client", "worker" or "reader".
 std::string_view name_of(Role role);
 std::optional<Role> role_named(std::string_view name);
 
@@ -56,46 +56,46 @@ CurveKey public_key_of(const SecretKey& secret_key);
 
 /// Formats a key as 40 printable characters without quotes, backslashes or spaces.
 std::string z85(const CurveKey& key);
-/// Nothing for a text that is not a key.
+/// Returns nothing for a text that is not a key.
 std::optional<CurveKey> parse_z85(std::string_view text);
 
-/// The content of the key file of a program.
+/// The content of a program's key file.
 struct KeyFile {
   Role role = Role::kClient;
-  std::string name;  ///< of the key, for people
+  std::string name;  ///< name of the key, for people
   KeyPair pair;
-  /// the server's public key; absent in the server's own file
+  /// public key of the server; absent in the server's own file
   std::optional<CurveKey> server = {};
-  std::string path = {};  ///< file that it was read from
+  std::string path = {};  ///< path of the file that was read
 };
 
-/// Throws solver::InputError if the file is incomplete or readable by others (README.md).
+/// Throws solver::InputError if the file is incomplete, or if other users can read it (README.md).
 KeyFile read_key_file(const std::string& path);
 
 /// Writes a new file of mode 0600 and syncs it. Throws std::runtime_error, also if the file exists.
 void write_key_file(const std::string& path, const KeyFile& key);
 
-/// Whether the name is allowed for a key and its file.
+/// Returns whether a key and its file may have this name.
 bool is_key_name(std::string_view name);
 
 /// A key that the server admits.
 struct AuthorizedKey {
   std::string name;
-  Role role = Role::kClient;  ///< never the server's
+  Role role = Role::kClient;  ///< any role except that of a server
   CurveKey public_key{};
-  std::string added_at;  ///< UTC, ISO 8601
+  std::string added_at;  ///< time in UTC, ISO 8601
 };
 
 /// The list of keys that a server admits. Names and keys are unique.
 class AuthorizedKeys {
  public:
-  /// Null if the key is not in the list.
+  /// Returns null if the key is not in the list.
   const AuthorizedKey* find(const CurveKey& public_key) const;
   const AuthorizedKey* find(std::string_view name) const;
-  /// In the order of the file.
+  /// Returns the keys in the order of the file.
   const std::vector<AuthorizedKey>& all() const { return keys_; }
 
-  /// Throws solver::InputError if the name or key is in the list, or the name is not allowed.
+  /// Throws solver::InputError if the list has the name or key already, or the name is not allowed.
   void add(AuthorizedKey key);
   /// Throws solver::InputError for an unknown name.
   void remove(std::string_view name);
@@ -104,33 +104,33 @@ class AuthorizedKeys {
   std::vector<AuthorizedKey> keys_;
 };
 
-/// Reads the list; an empty file is an empty list. Throws solver::InputError for a fault in the
-/// file, and if every user may write it.
+/// Reads the list. An empty file is an empty list. Throws solver::InputError if the file has a
+/// fault, or if every user may write it.
 AuthorizedKeys read_authorized_keys(const std::string& path);
 
-/// Reads the list, calls `change` and atomically replaces the file, under a lock. Creates a missing
-/// file. Throws as `read_authorized_keys` and `change` do, and std::runtime_error if the file
-/// cannot be written; the file is then unchanged.
+/// Reads the list, calls `change` and atomically replaces the file. Holds a lock meanwhile. Creates
+/// a missing file. Throws the errors of `read_authorized_keys` and `change`, and std::runtime_error
+/// if the file cannot be written. After an error the file is unchanged.
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change);
 
-// Paths of files in a server's key folder.
+// Return paths of files in a server's key folder.
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
 
-/// Returns `named` or, if it is empty, the current folder or its subfolder `keys`. Throws
+/// Returns `named`. If that is empty, returns the current folder or its subfolder `keys`. Throws
 /// solver::InputError if the folder has no server key.
 std::string find_key_folder(const std::string& named);
 
-/// Creates server.key, client.key, worker.key, reader.key and the list with the last three; creates
-/// a missing folder with mode 0700. Returns the server's public key. Throws std::runtime_error if a
-/// file exists (then creates none) or cannot be created.
+/// Creates server.key, client.key, worker.key, reader.key, and the list with the last three keys.
+/// Creates a missing folder with mode 0700. Returns the server's public key. Throws
+/// std::runtime_error if a file cannot be created, or if one exists; then it creates none.
 CurveKey make_key_folder(const std::string& folder);
 
-/// Adds `public_key` to the list. Without one, creates a key pair, writes it to NAME.key and adds
-/// its public key. Throws solver::InputError if the name or key is in the list or the server's key
-/// cannot be read, and std::runtime_error if a file exists or cannot be written; the list is then
-/// unchanged.
+/// Adds `public_key` to the list. If that is absent, creates a key pair, writes it to NAME.key and
+/// adds its public key. Throws solver::InputError if the list has the name or key already or the
+/// server's key cannot be read, and std::runtime_error if a file exists or cannot be written. After
+/// an error the list is unchanged.
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key);
 

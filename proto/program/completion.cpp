@@ -11,8 +11,8 @@
 namespace oblique::protocol {
 namespace {
 
-// NAME is replaced by the name of the program and CASES by the words to offer. A key of CASES is a
-// command, or a command and a flag that takes a value.
+// Template of the completion script. NAME is replaced by the name of the program, and CASES by the
+// words to offer. A key of CASES is a command, or a command and a flag that takes a value.
 constexpr std::string_view kBothShells = R"(_NAME_offers() {
   case $1 in
 CASES    *) return 1 ;;
@@ -89,8 +89,8 @@ std::string quoted(const std::string& text) {
   return "'" + replaced(text, "'", R"('\'')") + "'";
 }
 
-/// Name of a check that is never active and that help does not show. CLI11 has no other place for
-/// notes about an option.
+/// Name of a check that is never active and not shown by help. Its description contains the allowed
+/// values of an option, because CLI11 has no other place for them.
 constexpr const char* kChoices = "choices";
 
 std::string values_of(CLI::Option& option, const ValueWords& words) {
@@ -101,7 +101,7 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
     }
   }
   try {
-    // The description of an inactive check is empty.
+    // Activates the check for a moment, because the description of an inactive check is empty.
     values = CLI::detail::split(option.get_validator(kChoices)->active().get_description(), ' ');
     option.get_validator(kChoices)->active(false);
   } catch (const CLI::OptionNotFound&) {  // the option has no choices
@@ -113,7 +113,8 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
   return offers;
 }
 
-/// The cases of a command and its subcommands. `path` contains the words that lead to it.
+/// Returns the cases of a command and its subcommands. `path` is the command as typed after
+/// PROGRAM.
 std::string cases_of(CLI::App& command, const std::string& path, const ValueWords& words) {
   std::string cases;
   std::string offers;

@@ -27,14 +27,14 @@ namespace {
 constexpr std::array<std::string_view, 4> kLevels{"debug", "info", "warning", "error"};
 constexpr std::array<std::string_view, 2> kFormats{"text", "json"};
 
-/// Returns the value of a variable; empty if it is not set. Containers and units set variables to
-/// empty texts to omit them.
+/// Returns the value of an environment variable; empty if it is not set. Containers and units set a
+/// variable to an empty text in order to omit it.
 std::string variable(const std::string& name) {
   const char* const value = name.empty() ? nullptr : std::getenv(name.c_str());
   return value == nullptr ? "" : value;
 }
 
-/// Turns "--worker-port" into the key "worker_port".
+/// Returns the key of an option: "worker_port" for "--worker-port".
 std::string key_of(const CLI::Option& option) {
   std::string key = option.get_name().substr(2);
   std::replace(key.begin(), key.end(), '-', '_');
@@ -47,7 +47,7 @@ void set(CLI::Option& option, const std::vector<std::string>& values) {
   option.run_callback();
 }
 
-/// The values of a key as they would be typed on the command line.
+/// Returns the values of a key in the form in which they would be typed on the command line.
 std::vector<std::string> typed_values(const TomlReader& file, std::string_view key,
                                       const toml::node& node) {
   std::vector<std::string> values;
@@ -76,8 +76,8 @@ std::string toml_value(const std::string& value) {
   return std::regex_match(value, kWithoutQuotes) ? value : toml_string(value);
 }
 
-/// The configuration folder of this installation: /etc/oblique for programs in /usr/bin,
-/// PREFIX/etc/oblique for those in PREFIX/bin.
+/// Returns the configuration folder of this installation: /etc/oblique for programs in /usr/bin,
+/// PREFIX/etc/oblique for programs in PREFIX/bin.
 std::filesystem::path configuration_folder() {
   std::error_code unknown;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
@@ -124,7 +124,7 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
   for (CLI::Option* option : app_.get_options()) {
     if (option->get_configurable()) {
       settings_.push_back({option, key_of(*option), option->get_envname()});
-      option->envname("");  // CLI11 would prefer it to the program's own variable
+      option->envname("");  // CLI11 would prefer this variable to the program's own one
     }
   }
   app_.footer(fmt::format(

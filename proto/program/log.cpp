@@ -30,7 +30,7 @@ class Message : public spdlog::custom_flag_formatter {
   void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
               spdlog::memory_buf_t& line) override {
     const std::string text(message.payload.data(), message.payload.size());
-    // In JSON, bytes that are not UTF-8 become U+FFFD, and other characters than ASCII are escaped.
+    // In JSON, invalid bytes become U+FFFD and all characters other than ASCII are escaped.
     const std::string shown =
         form_ == Form::kJson
             ? nlohmann::json(text).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace)
@@ -54,8 +54,9 @@ class Message : public spdlog::custom_flag_formatter {
   Form form_;
 };
 
-/// JOURNAL_STREAM names the file that systemd opened as standard error. Programs inherit the
-/// variable even if their standard error was redirected, so the file is compared.
+/// Returns whether systemd's journal reads standard error. JOURNAL_STREAM names the file that
+/// systemd opened for that. Programs inherit the variable even if their standard error was
+/// redirected, so the file is compared.
 bool journal_reads_standard_error() {
   const char* const stream = std::getenv("JOURNAL_STREAM");
   struct stat file {};

@@ -4,7 +4,7 @@
 
 namespace oblique::protocol {
 
-/// Settings of the log, as for --log-level and --log-format.
+/// Settings of the log. The options --log-level and --log-format set them.
 struct LogSettings {
   std::string level = "info";   ///< lowest level that is logged: debug, info, warning or error
   std::string format = "text";  ///< or "json"
@@ -16,7 +16,7 @@ struct LogSettings {
 /// control a terminal or forge a line. If standard error is systemd's journal, which adds times and
 /// names itself, the lines are such as
 ///     <6>ready
-/// with the level as the journal reads it. With format "json" each line is a JSON object with
+/// where the number is the level. With format "json" each line is a JSON object with
 /// `time`, `level`, `program` and `message`, always valid JSON and UTF-8. May be called again.
 void set_up_log(const std::string& program, const LogSettings& settings = {});
 

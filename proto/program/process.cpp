@@ -95,7 +95,7 @@ bool stop_with_parent(pid_t parent) {
     return true;
   }
   check_call(prctl(PR_SET_PDEATHSIG, SIGTERM) == 0, "cannot watch the parent process");
-  return getppid() == parent;  // no signal follows if the parent ended before
+  return getppid() == parent;  // if the parent has already ended, the system sends no signal
 }
 
 Notifier::Notifier()

@@ -10,12 +10,13 @@
 
 #include "proto/system/descriptor.h"
 
-// Signals, the parent process and the service manager, for long-running programs.
+// Signals, parent process and service manager of long-running programs.
 namespace oblique::protocol {
 
 /// While this object exists, SIGINT, SIGTERM and SIGHUP make a descriptor readable instead of
-/// ending the program. A SIGHUP that was ignored at the start, as by nohup, stays ignored. Create
-/// it before any thread starts, because threads inherit the signal mask.
+/// ending the program. If SIGHUP was ignored when the program started, for example by nohup, it
+/// stays ignored. The object must be created before any thread starts, because threads inherit the
+/// signal mask.
 class StopSignals {
  public:
   /// Throws std::system_error if the system refuses.
@@ -25,49 +26,50 @@ class StopSignals {
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
-  /// Readable while a signal is pending.
+  /// Becomes readable when a signal is pending.
   int descriptor() const { return descriptor_.number(); }
 
-  /// Whether a signal has arrived so far; consumes pending ones.
+  /// Returns whether a signal has ever arrived. Consumes pending signals.
   bool requested();
-  /// The same, after waiting for a signal for at most `longest`.
+  /// Waits for a signal, for at most `longest`, and returns whether one has ever arrived.
   bool wait(std::chrono::nanoseconds longest);
 
-  /// 128 plus the number of the first signal, as shells do: 130 for Ctrl-C.
+  /// Returns 128 plus the number of the first signal, as shells do; for Ctrl-C this is 130.
   int exit_code() const { return 128 + signal_; }
 
  private:
   sigset_t before_{};
   Descriptor descriptor_;
-  int signal_ = 0;  ///< the first; 0: none
+  int signal_ = 0;  ///< number of the first signal; 0: none
 };
 
 /// Makes a write to a pipe without a reader, or beyond the file size limit, return an error instead
 /// of ending the program.
 void survive_failed_writes();
 
-/// Adds --stop-with-parent PID, which sets `parent`.
+/// Adds the option --stop-with-parent PID, which sets `parent`.
 void add_stop_with_parent(CLI::App& app, pid_t& parent);
 
-/// Makes the system send SIGTERM when the parent process `parent` ends; does nothing for 0. Call it
-/// while StopSignals exists. False if the parent has already ended.
+/// Makes the system send SIGTERM when the parent process `parent` ends; does nothing for 0. Must be
+/// called while StopSignals exists. Returns false if the parent has already ended.
 bool stop_with_parent(pid_t parent);
 
-/// Sends the state of the program to systemd, as datagrams to the socket path in NOTIFY_SOCKET.
-/// Does nothing without that variable. Ignores errors.
+/// Reports the state of the program to systemd, in datagrams to the socket at the path in
+/// NOTIFY_SOCKET. Does nothing if that variable is not set. Ignores errors.
 class Notifier {
  public:
   using Clock = std::chrono::steady_clock;
 
   Notifier();
 
-  /// Reports that the program is ready, with `sentence` as the status of the service.
+  /// Reports that the program is ready. `sentence` becomes the status of the service.
   void ready(const std::string& sentence) const;
   /// Sets the status of the service.
   void status(const std::string& sentence);
-  /// Reports that the program is stopping, which may take up to `longest`.
+  /// Reports that the program is stopping, and that this may take up to `longest`.
   void stopping(const std::string& sentence, std::chrono::milliseconds longest) const;
-  /// Sends a keep-alive at half of WATCHDOG_USEC. To be called several times a second.
+  /// Sends a keep-alive each time half of WATCHDOG_USEC has passed. Must be called several times a
+  /// second.
   void feed_watchdog(Clock::time_point now);
 
  private:

@@ -12,35 +12,35 @@
 
 namespace oblique::protocol {
 
-// What the command lines of the three programs share.
+// Functions that the command lines of all three programs use.
 
 // Exit codes.
 inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kWrongUsage = 2;
 
-/// Makes an empty value of any option or argument of `app` and its commands wrong usage: it may
-/// come from an unset shell variable. Call it after all options were added.
+/// Makes an empty value of any option or argument of `app` and its commands wrong usage, because it
+/// may come from an unset shell variable. Must be called after all options were added.
 void refuse_empty_values(CLI::App& app);
 
-/// A check for numbers from `least` to `largest`; refuses NaN.
+/// Returns a check for numbers from `least` to `largest`. It refuses NaN.
 CLI::Validator number_between(double least, double largest);
 
-/// A check for 64-bit whole numbers of at least `least`.
+/// Returns a check for 64-bit whole numbers that are at least `least`.
 CLI::Validator whole_number_from(std::int64_t least);
 
-/// Group of options that help and completion omit.
+/// Name of the group of options that help and completion do not show.
 inline constexpr const char* kUnlisted = "Unlisted";
 
-/// Notes the allowed values of an option, for completion only. Returns `option`.
+/// Stores the allowed values of an option, which are used for completion only. Returns `option`.
 CLI::Option* note_choices(CLI::Option* option, std::span<const std::string_view> choices);
 
-/// The message for a command-line error. For an unknown word it suggests the nearest name of
-/// `command`, which is `app` or a command of it.
+/// Returns the message for a command-line error. For an unknown word it suggests the nearest name
+/// of `command`, which is `app` or one of its commands.
 std::string parse_error_message(const CLI::App& app, const CLI::App& command,
                                 const CLI::ParseError& error);
 
-/// Prints "WORDS: MESSAGE" and how to get help to standard error. `words` are the program and
+/// Prints "WORDS: MESSAGE" and a hint at help to standard error. `words` are the program and
 /// command as typed. Returns kWrongUsage.
 int report_wrong_usage(const std::string& words, const std::string& message);
 
@@ -53,8 +53,8 @@ using ValueWords = std::map<std::string, std::vector<std::string>>;
 
 /// If the command line is `PROGRAM completion bash|zsh`, prints the completion script of `app` and
 /// returns the exit code. The script is static: it contains commands, flags, choices
-/// (`note_choices`) and `words`, and offers file names for all other values. Call it after all
-/// commands and options were added.
+/// (`note_choices`) and `words`; for all other values it offers file names. Must be called after
+/// all commands and options were added.
 std::optional<int> print_completion(CLI::App& app, int argc, const char* const* argv,
                                     const ValueWords& words = {});
 

@@ -129,7 +129,8 @@ RangeValues::RangeValues(const Axis& axis)
     if (!(std::abs(first) < kExactBelow && std::abs(end) < kExactBelow && last < kExactBelow)) {
       break;
     }
-    // Value i is the double nearest to the decimal, so that 0.1:1:10 has 0.3.
+    // If both ends are decimals with the same factor `per_unit`, each value is the double nearest
+    // to its decimal: 0.1:1:10 contains 0.3.
     if (first / per_unit == from_ && end / per_unit == to_ && std::fmod(end - first, last) == 0.0) {
       decimals_ = {first, (end - first) / last, per_unit};
       break;
@@ -236,7 +237,8 @@ bool is_drawn(const Axis& axis) {
 }
 
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block) {
-  for (const bool are_single : {false, true}) {  // `links` and `length` come first
+  // `links` and `length` are set before the lengths of single links
+  for (const bool are_single : {false, true}) {
     for (const Axis* axis : model_axes(block)) {
       const std::size_t number = key_number(axis->key());
       if (axis->expression().empty() && link_of_key(number).has_value() == are_single) {
@@ -260,8 +262,8 @@ Block block_of(std::vector<Axis> axes) {
 
 namespace {
 
-/// Unless `is_met`, throws InputError for `key` with `sentence`, formatted with the key and the
-/// arguments.
+/// If `is_met` is false, throws InputError for `key` with `sentence`, which is formatted with the
+/// key and the arguments.
 template <typename... Arguments>
 void require(bool is_met, std::string_view sentence, std::string_view key,
              const Arguments&... arguments) {
@@ -285,13 +287,13 @@ void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   std::vector<double> values(axis.values().begin(), axis.values().end());
   std::sort(values.begin(), values.end());
   const auto twice = std::adjacent_find(values.begin(), values.end());
-  // In a zip, for example of measurements, a value may occur twice.
+  // A zip may contain a value twice, for example in a list of measurements.
   require(twice == values.end() || kind == BlockKind::kZip,
           "{} has {} twice: the values of a list must differ", key.name,
           twice == values.end() ? 0.0 : *twice);
 }
 
-/// Whether the key takes only whole numbers, given that it takes `from` and values up to `to`.
+/// Returns whether the key takes only whole numbers. It must take `from` and values up to `to`.
 bool takes_whole_numbers(const ParameterKey& key, double from, double to) {
   return !key.is_allowed(from + std::min(0.25, 0.5 * (to - from)));
 }
@@ -313,15 +315,14 @@ void check_range(const ParameterKey& key, const Axis& axis) {
   const RangeValues values(axis);
   if (axis.spacing() == SPACING_LOGARITHMIC) {
     check_positive(key, axis.from());
-    // Few sequences of whole numbers have a constant ratio, so the loop soon finds a value that is
-    // not allowed.
+    // Whole numbers with a constant ratio are rare, so the loop soon finds a wrong value.
     const bool takes_whole = takes_whole_numbers(key, axis.from(), axis.to());
     for (std::uint64_t i = 0; takes_whole && i < axis.count(); ++i) {
       solver::check_value(key, values.at(i));
     }
     return;
   }
-  // A key allows an interval or its whole numbers. If the second value is allowed, all are.
+  // A key allows an interval, or only its whole numbers. If the second value is allowed, all are.
   solver::check_value(key, values.at(std::min<std::uint64_t>(1, axis.count() - 1)));
 }
 
@@ -369,7 +370,7 @@ void check_distribution(const ParameterKey& key, const Axis& axis) {
   }
 }
 
-/// Checks that the axis has one kind of values, and checks these.
+/// Checks that the axis has exactly one kind of values, and checks the values.
 void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
   const std::array kinds{!axis.values().empty(), axis.count() > 0, axis.has_distribution(),
                          !axis.expression().empty()};
@@ -475,7 +476,7 @@ bool needs_point_validation(const solver::ModelParameters& model, const Block& b
     check_reach(model, block);
     return false;
   } catch (const InputError&) {
-    return true;  // the point with the largest H may have a longer finger than the shortest one
+    return true;  // the point with the largest H may have a longer finger than the shortest
   }
 }
 

@@ -59,7 +59,7 @@ constexpr std::array<Function, 22> kFunctions{{
                                                             : x[2]; }},
 }};
 
-/// Precedence, weakest first. `not` and signs precede one value.
+/// Precedence from the weakest to the strongest. `not` and signs apply to the value that follows.
 enum Priority { kOr = 1, kAnd, kNot, kComparison, kSum, kProduct, kSign, kPower };
 
 struct Operator {
@@ -68,7 +68,7 @@ struct Operator {
   double (*compute)(const double* x);
 };
 
-/// Binary operators. The first match is used, so `<=` precedes `<`.
+/// Binary operators. The first match is used, so `<=` must precede `<`.
 constexpr std::array<Operator, 15> kOperators{{
     {"||", kOr, [](const double* x) { return truth(x, x[0] != 0.0 || x[1] != 0.0); }},
     {"or", kOr, [](const double* x) { return truth(x, x[0] != 0.0 || x[1] != 0.0); }},
@@ -105,7 +105,7 @@ std::string_view name_at(std::string_view text) {
 
 }  // namespace
 
-/// Parses by precedence climbing. Each function appends the steps for the text that it reads.
+/// A parser by precedence climbing. Each function appends the steps for the text that it reads.
 class Expression::Parser {
  public:
   Parser(std::string_view text, Expression& to, const MeaningOf& meaning_of)
@@ -122,7 +122,7 @@ class Expression::Parser {
   }
 
  private:
-  /// The next character that is not a space; 0 at the end.
+  /// Returns the next character that is not a space; 0 at the end.
   char next() {
     rest_.remove_prefix(std::min(rest_.find_first_not_of(" \t"), rest_.size()));
     return rest_.empty() ? '\0' : rest_[0];
@@ -133,7 +133,7 @@ class Expression::Parser {
     return is_next;
   }
 
-  /// The operator after a value; null at a bracket, a comma or the end.
+  /// Returns the operator after a value; null at a bracket, a comma or the end.
   const Operator* next_operator() {
     const char c = next();
     const std::string_view word = name_at(rest_);
@@ -151,7 +151,7 @@ class Expression::Parser {
                                 : fmt::format("an operator is missing before {}", quoted_next()));
   }
 
-  /// Reads a value and all operations after it that bind at least as strongly as `weakest`.
+  /// Reads a value, and all operations after it that bind at least as strongly as `weakest`.
   void read_operations(int weakest) {
     read_value(weakest);
     bool is_compared = false;
@@ -195,7 +195,7 @@ class Expression::Parser {
     }
   }
 
-  /// The next name or character, for a message.
+  /// Returns the next name or character, for a message.
   std::string quoted_next() const {
     const std::size_t bytes =
         std::max(name_at(rest_).size(), protocol::first_character(rest_).bytes);
@@ -294,7 +294,7 @@ double Expression::value_at(std::span<const double> values) const {
     ++end;
   }
   const double value = stack.front();
-  // a NaN without a sign
+  // A NaN may have a sign; this one has none.
   return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;
 }
 

@@ -12,34 +12,35 @@ namespace oblique::expressions {
 /// Maximum length of an expression [bytes].
 inline constexpr std::size_t kLongestText = 1000;
 
-/// The functions that an expression may call.
+/// Returns the names of the functions that an expression may call.
 std::vector<std::string_view> function_names();
 
 /// An expression such as `A^2 / (4 * pi)` or `mu > 0.5 and not e == 1`, compiled to steps of a
-/// stack machine. It may contain numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not` (&&
-/// || !), brackets and functions.
+/// stack machine. It may contain numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not`
+/// (also && || !), brackets and functions.
 class Expression {
  public:
   /// `meaning_of` is called for each name, in the order of the text. It returns the index of the
-  /// name's value in `value_at`, or a constant, or throws. Throws solver::InputError, which states
-  /// the fault and what is allowed, without the text.
+  /// name's value in the argument of `value_at`, or a constant, or throws. Throws
+  /// solver::InputError, which states the fault and what is allowed, but not the text.
   using MeaningOf = std::function<std::variant<std::size_t, double>(std::string_view name)>;
   Expression(std::string_view text, const MeaningOf& meaning_of);
 
-  /// The value, which may be NaN or infinite. A comparison is 1 or 0, or NaN if a side is NaN.
+  /// Returns the value, which may be NaN or infinite. A comparison is 1 or 0, or NaN if a side is
+  /// NaN.
   double value_at(std::span<const double> values) const;
 
  private:
   class Parser;
-  /// Replaces the top `arguments` values of the stack by the result of `compute`. Without `compute`
-  /// it pushes a constant, or the value with that index.
+  /// Replaces the top `arguments` values of the stack by the result of `compute`. Without
+  /// `compute`, pushes a constant or the value with that index.
   struct Step {
     double (*compute)(const double* x) = nullptr;
     std::size_t arguments = 0;
     std::variant<std::size_t, double> pushed = 0.0;
   };
 
-  std::vector<Step> steps_;  ///< at most one per byte of the text
+  std::vector<Step> steps_;  ///< at most one step per byte of the text
 };
 
 }  // namespace oblique::expressions

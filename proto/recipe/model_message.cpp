@@ -28,7 +28,7 @@ using Model = solver::ModelParameters;
 using Message = ModelParameters;
 using Field = std::tuple<double Model::*, double (Message::*)() const, void (Message::*)(double)>;
 
-/// Numeric members of a model, and their fields in the message.
+/// The numeric members of a model, and their fields in the message.
 constexpr std::array<Field, 12> kFields{{
     {&Model::E_Pa, &Message::e_pa, &Message::set_e_pa},
     {&Model::A_m2, &Message::a_m2, &Message::set_a_m2},
@@ -44,7 +44,7 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-/// Maximum size of a recipe [bytes]; the frame for a worker also has room for other fields.
+/// Maximum size of a recipe [bytes]. It must fit into a frame for a worker, with other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
 std::string comparable_bytes(Block block) {
@@ -85,7 +85,7 @@ ModelParameters to_message(const solver::ModelParameters& model) {
 }
 
 solver::ModelParameters from_message_unchecked(const ModelParameters& message) {
-  // The struct has `int` and an enumeration, so ranges are checked before the conversion.
+  // Checks these ranges before the conversion, because the struct has `int` and an enumeration.
   solver::check_value(model_key("elements_per_link"), message.elements_per_link());
   solver::check_value(model_key("integrator"), message.integrator());
   solver::ModelParameters model;
@@ -105,7 +105,7 @@ solver::ModelParameters from_message(const ModelParameters& message) {
 }
 
 std::string canonical_model(const solver::ModelParameters& model) {
-  std::vector<std::string> lengths;  // + 0.0 gives both zeros the same text
+  std::vector<std::string> lengths;  // adding 0.0 gives both zeros the same text
   for (const double length_m : model.lengths_m) {
     lengths.push_back(exact_number(length_m + 0.0));
   }
@@ -158,7 +158,7 @@ std::string sha256_of(std::string_view bytes) {
   std::array<unsigned char, crypto_hash_sha256_BYTES> digest{};
   crypto_hash_sha256(digest.data(), reinterpret_cast<const unsigned char*>(bytes.data()),
                      bytes.size());
-  std::string text(2 * digest.size() + 1, '\0');  // libsodium appends a zero
+  std::string text(2 * digest.size() + 1, '\0');  // libsodium appends a zero byte
   sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
   text.pop_back();
   return text;
@@ -200,8 +200,8 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
                     key.name, exact_number(step), kMaxPoints));
   }
   const double whole_steps = std::round(steps);
-  // Decimal steps are not exact in binary. This tolerance, relative to a step, is well above their
-  // rounding.
+  // Steps in decimals are not exact in binary. This relative tolerance is well above rounding
+  // errors.
   const double tolerance = 1e-9 * std::max(1.0, steps);
   if (std::abs(steps - whole_steps) > tolerance) {
     const double below = from + std::floor(steps) * step;
@@ -291,7 +291,7 @@ solver::ModelParameters ModelInput::model() const {
   for (const auto& [name, value] : values) {
     solver::check_value(model_key(name), value);
   }
-  // `links` must be applied before `length`, as in the listing.
+  // `links` must be applied before `length`, which is also the order of the listing.
   for (const auto& key : solver::model_keys()) {
     if (const auto value = values.find(key.name); value != values.end()) {
       key.set(model, value->second);

@@ -32,7 +32,8 @@ double finite_or_0(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-/// The last of the sorted `places` whose `first` is at most `number`. There must be one.
+/// Returns the index of the last of the sorted `places` whose `first` is at most `number`. There
+/// must be such a place.
 template <class Place, class Number>
 std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, const Number& first) {
   const auto next = std::upper_bound(
@@ -41,7 +42,7 @@ std::size_t place_of(const std::vector<Place>& places, std::uint64_t number, con
   return static_cast<std::size_t>(next - places.begin()) - 1;
 }
 
-/// Calls `work` and adds the key and the expression to an InputError.
+/// Calls `work`. If that throws an InputError, adds the key and the expression to the error.
 template <typename Work>
 auto in_expression(std::string_view key, std::string_view text, Work work) {
   try {
@@ -52,7 +53,7 @@ auto in_expression(std::string_view key, std::string_view text, Work work) {
   }
 }
 
-/// Calls `act` and adds the block's number to its error if the recipe has several blocks.
+/// Calls `act`. Adds the block's number to an InputError if the recipe has several blocks.
 template <typename Act>
 void in_block(const Recipe& recipe, std::size_t number, Act act) {
   try {
@@ -66,8 +67,8 @@ void in_block(const Recipe& recipe, std::size_t number, Act act) {
   }
 }
 
-/// Calls `act` with every number below `points`, or with `tries` random ones if `points` exceeds
-/// `most`. Returns whether it called all.
+/// Calls `act` with every number below `points`. If there are more than `most`, calls it with
+/// `tries` random numbers instead. Returns whether it used every number.
 template <typename Act>
 bool for_each_or_some(std::uint64_t points, std::uint64_t most, std::uint64_t tries,
                       std::uint64_t seed, Act act) {
@@ -83,8 +84,8 @@ bool for_each_or_some(std::uint64_t points, std::uint64_t most, std::uint64_t tr
 /// Computes the points of one block of any kind from their numbers.
 class PointTable::BlockPoints : public BlockPlace {
  public:
-  /// `block` must have passed `check_block` and outlive this. `base` has the values of keys that
-  /// the block lacks.
+  /// `block` must have passed `check_block`, and must outlive this object. `base` has the values of
+  /// keys that the block lacks.
   BlockPoints(const solver::ModelParameters& base, const Block& block)
       : BlockPlace{.points = points_of_block(block)}, block_(&block) {
     std::uint32_t dimensions = 0;
@@ -113,7 +114,7 @@ class PointTable::BlockPoints : public BlockPlace {
   const Block& definition() const { return *block_; }
   std::uint64_t points_per_model() const { return points / models; }
 
-  /// The values of a point in the order of the axes. The functions below take them as input.
+  /// Returns the values of a point in the order of the axes, which the functions below need.
   std::vector<double> values_at(std::uint64_t point) const {
     std::vector<double> values(sources_.size());
     for (std::size_t i = 0; i < sources_.size(); ++i) {
@@ -134,7 +135,7 @@ class PointTable::BlockPoints : public BlockPlace {
 
   solver::ModelParameters model(solver::ModelParameters base,
                                 std::span<const double> values) const {
-    // `links` and `length` come before single lengths
+    // Sets `links` and `length` before the lengths of single links.
     for (const bool are_single : {false, true}) {
       for (std::size_t i = sources_.size() - kPointKeyOrder.size(); i-- > 0;) {
         const std::size_t number = sources_[i].layout.key;
@@ -148,7 +149,7 @@ class PointTable::BlockPoints : public BlockPlace {
     return base;
   }
 
-  /// Why the point cannot be solved, with its values; nothing if it can be.
+  /// Returns why the point cannot be solved, with its values; nothing if it can be solved.
   std::optional<InputError> fault(const solver::ModelParameters& base,
                                   std::span<const double> values) const {
     if (filter_ && std::isnan(filter_->expression.value_at(values))) {
@@ -170,10 +171,10 @@ class PointTable::BlockPoints : public BlockPlace {
   }
 
  private:
-  /// Source of the values of an axis; a list has neither range nor quantiles.
+  /// The source of an axis's values. A list has neither `range` nor `quantiles`.
   struct Source {
     AxisLayout layout;
-    std::uint32_t dimension;  ///< dimension in the sample, if the axis is drawn
+    std::uint32_t dimension;  ///< number of the axis among the drawn axes of the sample
     std::optional<RangeValues> range = {};
     std::optional<sampling::Quantiles> quantiles = {};
   };
@@ -198,7 +199,7 @@ class PointTable::BlockPoints : public BlockPlace {
     });
   }
 
-  /// The axis of that name, or a constant of the base model.
+  /// Returns the axis of that name, or the constant that the base model has for it.
   std::variant<std::size_t, double> meaning_of(const solver::ModelParameters& base,
                                                std::string_view name) const {
     const auto axis_of = [this](std::size_t key) {
@@ -211,13 +212,13 @@ class PointTable::BlockPoints : public BlockPlace {
     const auto link = link_of_key(key);
     std::size_t axis = axis_of(key);
     if (axis == sources_.size() && link) {
-      axis = axis_of(key_number("length"));  // `length` sets every link
+      axis = axis_of(key_number("length"));  // `length` sets the length of every link
     }
     if (axis < sources_.size()) {
       return axis;
     }
     if (link && axis_of(key_number("links")) < sources_.size()) {
-      return base.lengths_m.front();  // `links` copies the first length to all links
+      return base.lengths_m.front();  // `links` copies the length of the first link to all links
     }
     if (link && *link >= base.lengths_m.size()) {
       throw InputError(
@@ -226,12 +227,12 @@ class PointTable::BlockPoints : public BlockPlace {
     return key_numbered(key).get(base);
   }
 
-  /// Number of consecutive points with the same model: all if no model key varies; 1 if a model key
-  /// depends on a value that varies from point to point; in a product the number of combinations of
-  /// H, mu and e.
+  /// Returns the number of consecutive points with the same model: all if no model key varies; 1 if
+  /// a model key depends on a value that varies from point to point; in a product the number of
+  /// combinations of H, mu and e.
   std::uint64_t counted_points_per_model() const {
     const bool is_product = block_kind(*block_) == BlockKind::kProduct;
-    std::vector<bool> varies;  // whether the axis varies while the model axes stay fixed
+    std::vector<bool> varies;  // whether each axis varies while the model axes stay fixed
     for (const Source& source : sources_) {
       varies.push_back(is_drawn(*source.layout.axis) &&
                        (!is_product || is_point_key(source.layout.key)));
@@ -289,7 +290,7 @@ class PointTable::BlockPoints : public BlockPlace {
     return source.range ? source.range->at(number) : layout.axis->values(static_cast<int>(number));
   }
 
-  /// "k = 1e7, H = 0.3, mu = 0.1, e = 1"
+  /// Returns a text such as "k = 1e7, H = 0.3, mu = 0.1, e = 1".
   std::string in_words(std::span<const double> values) const {
     std::string words;
     for (std::size_t i = 0; i < sources_.size(); ++i) {
@@ -301,7 +302,7 @@ class PointTable::BlockPoints : public BlockPlace {
 
   const Block* block_;
   std::vector<Source> sources_;    ///< one per axis
-  std::vector<Formula> formulas_;  ///< each after those that compute its inputs
+  std::vector<Formula> formulas_;  ///< each comes after the formulas that compute its inputs
   std::optional<Formula> filter_;
 };
 
@@ -462,7 +463,7 @@ void PointTable::validate_points() const {
 }
 
 bool is_close(double value, double own) {
-  // relative; about a thousand times the rounding error of a double
+  // Relative tolerance, about a thousand times the rounding error of a double.
   constexpr double kTolerance = 1e-12;
   return std::abs(value - own) <= kTolerance * std::abs(own);
 }
@@ -516,13 +517,12 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table) 
                          value, expected);
     }
   }
-  // A result without a model was solved when the study had one model. The study may have grown
-  // since.
+  // A result without a model was solved before the study grew and got several models.
   bool has_model = !result.has_model() && own.model == 0;
   try {
     has_model = has_model || (result.has_model() && is_close(from_message_unchecked(result.model()),
                                                              table.model(own.model)));
-  } catch (const InputError&) {  // a whole number outside the domain
+  } catch (const InputError&) {  // a whole number of the model is outside its domain
   }
   return has_model ? "" : "the worker solved it with another model than that of the study";
 }
@@ -535,12 +535,12 @@ Point inputs_of(const PointResult& result, const PointTable& table) {
 
 namespace {
 
-/// Average size [bytes] of a result and a model in a database (server/store/README.md).
+/// Average size of a result, and of a model, in a database [bytes] (server/store/README.md).
 constexpr std::uint64_t kBytesAResult = 970;
 constexpr std::uint64_t kBytesAModel = 600;
 
-/// Up to kMaxCounted points are counted; above that numbers are estimated from kSampledPoints
-/// random points.
+/// Up to kMaxCounted points are counted. For larger studies numbers are estimated from
+/// kSampledPoints random points.
 constexpr std::uint64_t kMaxCounted = 100'000;
 constexpr std::uint64_t kSampledPoints = 10'000;
 
@@ -559,7 +559,8 @@ PassingPoints passing_points(const PointTable& table, int block) {
       !is_counted};
 }
 
-/// Points that pass the filters: all of them, or at most `kSampledPoints` random ones.
+/// Returns the points that pass the filters; for large studies at most `kSampledPoints` random
+/// ones.
 std::vector<std::uint64_t> some_points(const PointTable& table) {
   constexpr std::uint64_t kTries = 100 * kSampledPoints;
   const std::uint64_t most = table.size() <= kMaxCounted ? kMaxCounted : kSampledPoints;
@@ -570,17 +571,17 @@ std::vector<std::uint64_t> some_points(const PointTable& table) {
     }
   });
   if (points.empty()) {
-    points.push_back(0);  // the filter includes few points or none
+    points.push_back(0);  // the filter includes no point, or too few to find one
   }
   return points;
 }
 
-/// Counts the different falls of the study. `some` contains all points or random ones. In the
-/// second case the number is estimated (Good 1953): the share of points whose fall occurs in `some`
-/// is about the share of points of `some` whose fall occurs there at least twice.
+/// Counts the different falls of the study. `some` contains all points or random ones. For random
+/// points the number is estimated (Good 1953): the share of the study's points whose fall occurs in
+/// `some` is about the share of points in `some` whose fall occurs there at least twice.
 void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some, StudySize& size) {
-  std::unordered_map<std::uint64_t, std::uint64_t> met;  // points by hash of their fall
-  std::optional<std::uint64_t> model;  // model of the last point; `fall` is its hash
+  std::unordered_map<std::uint64_t, std::uint64_t> met;  // number of points by hash of their fall
+  std::optional<std::uint64_t> model;  // model of the last point; `fall` is the hash of its fall
   std::uint64_t fall = 0;
   for (const std::uint64_t point : some) {
     if (const auto next = table.point(point).model; next != model) {

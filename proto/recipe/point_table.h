@@ -15,7 +15,7 @@
 
 namespace oblique::protocol {
 
-/// Maximum number of blocks, and of expressions including filters, in a study.
+/// Maximum number of blocks in a study, and maximum number of expressions including filters.
 inline constexpr std::size_t kMaxBlocks = 10'000;
 inline constexpr std::size_t kMaxExpressions = 1000;
 
@@ -37,14 +37,14 @@ struct Segment {
 /// The points and models of one block.
 struct BlockPlace {
   std::uint64_t first_point = 0;
-  std::uint64_t points = 0;  ///< including those that the filter leaves out
+  std::uint64_t points = 0;  ///< includes points that the filter leaves out
   std::uint64_t first_model = 0;
   std::uint64_t models = 0;
   bool needs_point_validation = false;  ///< see blocks.h
 };
 
-/// A checked recipe, which computes point i and model j from their numbers in time and memory that
-/// do not depend on the number of points. Threads may share a const table.
+/// A checked recipe. Computes point i and model j from their numbers, in time and memory that do
+/// not depend on the number of points. Threads may share a const table.
 class PointTable {
  public:
   /// Throws solver::InputError for a recipe without a model or blocks; for too many points, blocks
@@ -58,48 +58,48 @@ class PointTable {
   PointTable& operator=(const PointTable&) = delete;
 
   const Recipe& recipe() const { return *recipe_; }
-  /// Whether the study requests estimated errors.
+  /// Returns whether the study requests estimated errors.
   bool wants_errors() const { return recipe_->errors(); }
-  std::uint64_t size() const { return points_; }  ///< including points that filters leave out
+  std::uint64_t size() const { return points_; }  ///< includes points that filters leave out
   std::uint64_t models() const { return models_; }
 
   bool has_filter() const { return has_filter_; }
-  /// Whether the filter includes the point. A condition that is NaN leaves out it.
+  /// Returns whether the filter includes the point. If the condition is NaN, it does not.
   bool passes_filter(std::uint64_t index) const;
-  /// The first point of [begin, end) that passes the filters, or `end`.
+  /// Returns the first point of [begin, end) that passes the filters, or `end`.
   std::uint64_t first_passing(std::uint64_t begin, std::uint64_t end) const;
 
-  /// Whether `validate_points` has anything to check.
+  /// Returns whether `validate_points` has anything to check.
   bool has_points_to_validate() const { return blocks_to_validate_ > 0; }
-  /// Checks blocks with values or filters that can only be checked point by point: all of their
-  /// points, or `kMaxValidated` random ones in all (about 0.1 s). Throws solver::InputError, with
-  /// block and point, for a value that is not allowed and for a filter that leaves out all points
-  /// of its block. A point with a wrong value that was not checked fails later (`fault`).
+  /// Checks blocks whose values or filter can only be checked point by point: all of their points,
+  /// or `kMaxValidated` random points in all (about 0.1 s). Throws solver::InputError, with block
+  /// and point, for a value that is not allowed, and for a filter that leaves out all points of its
+  /// block. If a wrong value was not checked, its point fails later (`fault`).
   void validate_points() const;
   static constexpr std::uint64_t kMaxValidated = 100'000;
 
-  /// Why a point cannot be solved, or that its filter is NaN, as a sentence with the values; empty
-  /// if it can be.
+  /// Returns a sentence if the point cannot be solved or its filter is NaN; else an empty text.
   std::string fault(std::uint64_t index) const;
 
-  // The functions below throw std::out_of_range for a point, model or block outside the study.
+  // The functions below throw std::out_of_range if the study has no such point, model or block.
 
-  /// A value that is not finite is replaced by 0, a model value that is not allowed by that of the
-  /// base model.
+  /// Returns a point. A value that is not finite is replaced by 0, and a model value that is not
+  /// allowed by the base model's value.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
-  /// In the order of the axes of the point's block. Values of expressions may be outside the
+  /// Returns a point's values in the order of its block's axes. Expressions may be outside the
   /// domain.
   std::vector<double> values(std::uint64_t index) const;
-  /// The longest run of consecutive points around `index` with the same model. Adjacent blocks
-  /// without model axes are one run.
+  /// Returns the longest run of consecutive points around `index` that have the same model.
+  /// Adjacent blocks without model axes are one run.
   Segment segment_at(std::uint64_t index) const;
 
   const BlockPlace& block(std::size_t number) const;
   std::size_t block_of_point(std::uint64_t index) const;
 
   /// Calls `visit` with the values of each of the first `points` points of a block, in the order of
-  /// its axes. They may be outside the domain. Throws solver::InputError for a wrong expression.
+  /// its axes. The values may be outside the domain. Throws solver::InputError for a wrong
+  /// expression.
   static void visit_values(const solver::ModelParameters& base, const Block& block,
                            std::uint64_t points,
                            const std::function<void(std::span<const double>)>& visit);
@@ -111,38 +111,38 @@ class PointTable {
   std::unique_ptr<Recipe> recipe_;  ///< its address does not change when the table moves
   solver::ModelParameters base_model_;
   std::vector<BlockPoints> blocks_;
-  std::vector<Segment> base_segments_;     ///< consecutive blocks without model axes
-  std::vector<std::size_t> model_blocks_;  ///< blocks with model axes, in order
+  std::vector<Segment> base_segments_;     ///< runs of consecutive blocks without model axes
+  std::vector<std::size_t> model_blocks_;  ///< indices of the blocks with model axes, in order
   std::uint64_t points_ = 0;
   std::uint64_t models_ = 0;
   std::size_t expressions_ = 0;
-  std::uint64_t blocks_to_validate_ = 0;  ///< number of blocks to check point by point
+  std::uint64_t blocks_to_validate_ = 0;  ///< number of blocks that must be checked point by point
   bool has_filter_ = false;
 };
 
-// The inputs of a point (H, mu, e and the model), as a worker sends them with a result. Two
-// machines may compute them with different last bits.
+// These functions handle the inputs of a point (H, mu, e and the model), which a worker sends with
+// a result. On two machines their last bits may differ.
 
-/// Whether `value` equals the finite number `own` to within a relative difference of 1e-12. Only
-/// zero is close to zero.
+/// Returns whether `value` equals the finite number `own` within a relative difference of 1e-12.
+/// Only zero is close to zero.
 bool is_close(double value, double own);
-/// Whether all parameters are close; whole numbers must be equal.
+/// Returns whether all parameters are close. Whole numbers must be equal.
 bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own);
-/// The same for two canonical texts of models. `model` may be any text.
+/// Returns whether two canonical texts of models are close. `model` may be any text.
 bool is_close(std::string_view model, std::string_view own);
 
-/// Sets the inputs of the result's point; the model only in studies with several models.
+/// Sets the inputs of the result's point. The model is set only in studies with several models.
 void set_inputs(PointResult& result, const PointTable& table);
 
-/// Why the inputs of a result differ from those of its point in `table`, or an empty text. A failed
-/// point may have none.
+/// Returns why the inputs of a result differ from the inputs of its point in `table`, or an empty
+/// text. The result of a failed point may have no inputs.
 std::string fault_of_inputs(const PointResult& result, const PointTable& table);
 
-/// The inputs of a result; if it has none, those of its point in `table`.
+/// Returns the inputs of a result. If it has none, returns the inputs of its point in `table`.
 Point inputs_of(const PointResult& result, const PointTable& table);
 
-/// Number of points of a block that pass its filter: counted up to 10^5 points, else estimated from
-/// 10^4 random points.
+/// Number of points of a block that pass its filter. Up to 10^5 points are counted; for larger
+/// blocks the number is estimated from 10^4 random points.
 struct PassingPoints {
   std::uint64_t points;
   bool estimated;
@@ -150,14 +150,14 @@ struct PassingPoints {
 
 /// The size of a study.
 struct StudySize {
-  std::uint64_t points;   ///< points that pass the filters
-  bool points_estimated;  ///< `points` is estimated from random points
+  std::uint64_t points;   ///< number of points that pass the filters
+  bool points_estimated;  ///< true if `points` is estimated from random points
   std::uint64_t models;
   std::uint64_t falls;   ///< number of different falls
-  bool falls_estimated;  ///< from 10^4 random points, because the study has more than 10^5
+  bool falls_estimated;  ///< true if `falls` is estimated from 10^4 random points of more than 10^5
   std::uint64_t bytes;   ///< size of the results in a database [bytes]
-  std::vector<std::uint64_t> examples;     ///< numbers of up to 64 random points
-  std::vector<PassingPoints> blocks = {};  ///< one per block
+  std::vector<std::uint64_t> examples;     ///< up to 64 random points that pass the filters
+  std::vector<PassingPoints> blocks = {};  ///< one element per block
 };
 StudySize size_of(const PointTable& table);
 

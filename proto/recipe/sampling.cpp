@@ -15,15 +15,15 @@
 namespace oblique::sampling {
 namespace {
 
-/// A bijection of 64-bit numbers in which every bit of the result depends on every bit of `z`.
+/// Maps 64-bit numbers one to one. Every bit of the result depends on every bit of `z`.
 std::uint64_t mixed(std::uint64_t z) {
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
   z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
   return z ^ (z >> 31);
 }
 
-/// A permutation of the numbers of `bits` bits: a Feistel network of two halves, which may differ
-/// in length. Each round changes one half by a hash of the other, so it is invertible.
+/// Permutes the numbers of `bits` bits by a Feistel network. Its two halves may differ in length.
+/// Each round changes one half by a hash of the other, so it is invertible.
 std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   constexpr std::uint64_t kRounds = 8;
   const int low_bits = (bits + 1) / 2;
@@ -38,12 +38,13 @@ std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   return (high << low_bits) | low;
 }
 
-/// Image of `i` < `n` under the permutation of 0 ... n-1 that `key` selects, without a list.
+/// Returns the image of `i` < `n` under the permutation of 0 ... n-1 that `key` selects.
 std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
   if (n < 2) {
     return 0;
   }
-  // Permutes all numbers with as many bits as n - 1, repeatedly until the result is below n.
+  // Permutes all numbers that have as many bits as n - 1, and repeats this until the result is
+  // below n.
   const auto bits = static_cast<int>(std::bit_width(n - 1));
   do {
     i = shuffled_bits(i, bits, key);
@@ -51,7 +52,7 @@ std::uint64_t permuted(std::uint64_t i, std::uint64_t n, std::uint64_t key) {
   return i;
 }
 
-/// Direction numbers of one dimension, times 2^52.
+/// The direction numbers of one dimension, times 2^52.
 using Directions = std::array<std::uint64_t, kSobolBits>;
 
 /// Computes v_k = a_1 v_(k-1) + ... + a_(s-1) v_(k-s+1) + v_(k-s) + v_(k-s) / 2^s, without carry,
@@ -83,14 +84,14 @@ constexpr auto kDirections = [] {
   return all;
 }();
 
-/// The middle of interval number `bits` of 2^`digits` equal intervals of (0, 1). Exact up to 52
-/// digits, so never 0 or 1.
+/// Returns the middle of interval number `bits` of 2^`digits` equal intervals of (0, 1). The result
+/// is exact up to 52 digits, so it is never 0 or 1.
 double middle(std::uint64_t bits, int digits) {
   return std::ldexp(static_cast<double>(bits) + 0.5, -digits);
 }
 
-/// (stratum + u) / count with u in (0, 1). u has few enough digits that the sum is exact, so the
-/// quotient is within the stratum and below 1.
+/// Returns (stratum + u) / count with u in (0, 1). u has so few digits that the sum is exact, so
+/// the quotient is within the stratum and below 1.
 double stratified_fraction(std::uint64_t count, std::uint64_t key, std::uint64_t index) {
   const int digits = kSobolBits - static_cast<int>(std::bit_width(count));
   const double within = middle(hashed(mixed(key), index) >> (64 - digits), digits);
@@ -100,7 +101,7 @@ double stratified_fraction(std::uint64_t count, std::uint64_t key, std::uint64_t
 }  // namespace
 
 std::uint64_t hashed(std::uint64_t key, std::uint64_t index) {
-  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio, odd
+  constexpr std::uint64_t kGolden = 0x9e3779b97f4a7c15;  // 2^64 / golden ratio, an odd number
   return mixed(key + (index + 1) * kGolden);
 }
 
@@ -114,13 +115,13 @@ std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension) {
 }
 
 std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key) {
-  // One hash contains the flips for a tree of six levels, which has 63 nodes.
+  // One hash contains the flips of a tree with six levels, which has 63 nodes.
   constexpr int kLevels = 6;
   std::uint64_t scrambled = 0;
   for (int depth = 0; depth < kSobolBits; depth += kLevels) {
     const std::uint64_t root = (std::uint64_t{1} << depth) | (bits >> (kSobolBits - depth));
     const std::uint64_t flips = hashed(key, root);
-    std::uint64_t node = 1;  // 1 at the root of the tree, then 2 and 3, 4 to 7, ...
+    std::uint64_t node = 1;  // 1 is the root of the tree, with the children 2 and 3
     const int levels = std::min(kLevels, kSobolBits - depth);
     for (int level = 0; level < levels; ++level) {
       const std::uint64_t digit = (bits >> (kSobolBits - 1 - depth - level)) & 1;
@@ -156,12 +157,13 @@ double normal_quantile(double p) {
   if (p > 0.5) {
     return -normal_quantile(1.0 - p);
   }
-  // M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions, 26.2.23: within 4.5e-4.
+  // Start value, within 4.5e-4: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions,
+  // 26.2.23.
   const double t = std::sqrt(-2.0 * std::log(p));
   double z = (2.515517 + t * (0.802853 + t * 0.010328)) /
                  (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))) -
              t;
-  // Halley's method on Phi(z) = p, for which Phi'' = -z Phi'. The error falls to its third power.
+  // Halley's method for Phi(z) = p, where Phi'' = -z Phi'. Each step cubes the error.
   constexpr int kSteps = 3;
   for (int i = 0; i < kSteps; ++i) {
     const double density = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);

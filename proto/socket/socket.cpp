@@ -33,8 +33,8 @@ void set_keys(zmq::socket_t& socket, const KeyFile& key) {
              zmq::const_buffer(key.pair.secret_key.data(), key.pair.secret_key.bytes().size()));
 }
 
-/// Why a server with keys rejected ours. It sends the same status for unknown keys and for keys for
-/// its other port.
+/// Returns why a server with keys has rejected our key. The server sends the same status for
+/// unknown keys and for keys for its other port.
 std::string rejection_reason(std::uint32_t status, const DealerSettings& settings) {
   constexpr std::uint32_t kNotAdmitted = 400;
   if (status != kNotAdmitted) {
@@ -59,8 +59,8 @@ zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& setting
   }
   constexpr KeepAlive kKeepAlive;
   constexpr int kQueuedMessages = 1000;
-  // The system would double the pause between its own attempts, up to a minute after the network is
-  // back.
+  // Maximum time of one attempt to connect. Without it the system would double its own pauses, and
+  // reconnecting could take a minute after the network is back.
   constexpr int kConnectTimeout_ms = 3000;
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   if (settings.key) {
@@ -83,7 +83,7 @@ zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& setting
 }
 
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
-  // This option selects the only IP version that libzmq resolves.
+  // libzmq resolves only one IP version. This option selects it.
   const auto [has_v4, has_v6] = families_of(host_of(settings.url));
   try {
     socket.set(zmq::sockopt::ipv6, has_v6 && (!has_v4 || attempt % 2 == 1));
@@ -101,7 +101,7 @@ SocketMonitor::SocketMonitor(zmq::context_t& context, zmq::socket_t& socket,
   const auto name = [](int number) { return "inproc://connections-" + std::to_string(number); };
   int number = 0;
   while (zmq_socket_monitor(socket_.handle(), name(number).c_str(), events) != 0) {
-    if (zmq_errno() != EADDRINUSE) {  // the previous socket of this name is still closing
+    if (zmq_errno() != EADDRINUSE) {  // the previous socket with this name is closing
       throw zmq::error_t();
     }
     ++number;
@@ -117,7 +117,7 @@ SocketMonitor::~SocketMonitor() {
 void SocketMonitor::take_events() {
   zmq::message_t frame;
   while (events_.recv(frame, zmq::recv_flags::dontwait)) {
-    // An event has two frames: its number with a value, and the address.
+    // An event has two frames: the first has its number and a value, the second the address.
     std::uint16_t event = 0;
     std::uint32_t value = 0;
     if (!frame.more() || frame.size() != sizeof event + sizeof value) {

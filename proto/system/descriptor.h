@@ -9,7 +9,7 @@
 
 namespace oblique::protocol {
 
-/// Owns a file descriptor and closes it; -1 is none.
+/// Owns a file descriptor and closes it. The number -1 means that there is none.
 class Descriptor {
  public:
   Descriptor() = default;
@@ -24,7 +24,7 @@ class Descriptor {
 
   int number() const { return number_; }
   bool is_open() const { return number_ >= 0; }
-  /// Gives up ownership.
+  /// Returns the descriptor and gives up its ownership.
   int release() { return std::exchange(number_, -1); }
   void close() {
     if (is_open()) {
@@ -36,23 +36,23 @@ class Descriptor {
   int number_ = -1;
 };
 
-/// Wakes a poll of another thread. Several calls before the poll count as one.
+/// Wakes another thread that polls a descriptor. Several calls before the poll count as one.
 class WakeUp {
  public:
-  /// Throws std::system_error if the system has no descriptor.
+  /// Throws std::system_error if the system has no descriptor left.
   WakeUp() : descriptor_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {
     if (!descriptor_.is_open()) {
       throw std::system_error(errno, std::generic_category(), "eventfd");
     }
   }
 
-  // A full or empty counter is no error: the descriptor has the right state.
+  // Ignores errors: if the counter is already full or empty, the descriptor has the right state.
   void wake() const { static_cast<void>(eventfd_write(descriptor(), 1)); }
   void clear() const {
     eventfd_t count = 0;
     static_cast<void>(eventfd_read(descriptor(), &count));
   }
-  /// Readable from `wake` until `clear`.
+  /// The descriptor is readable from `wake` until `clear`.
   int descriptor() const { return descriptor_.number(); }
 
  private:

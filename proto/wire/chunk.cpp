@@ -24,7 +24,7 @@ bool take(std::string_view& bytes, Number& number) {
   return true;
 }
 
-/// Removes a cell from the beginning of `bytes`; false if there is no complete one.
+/// Removes a cell from the beginning of `bytes`. Returns false if there is no complete cell.
 bool take_cell(std::string_view& bytes, Cell& cell) {
   std::uint32_t length = 0;
   if (!take(bytes, cell.kind)) {
@@ -48,7 +48,7 @@ bool take_cell(std::string_view& bytes, Cell& cell) {
   return false;
 }
 
-/// The alternatives of a Value are in the order of the kinds.
+/// The alternatives of a Value are in the same order as the kinds of cells.
 Cell cell_of(const Value& value) {
   Cell cell{.kind = static_cast<CellKind>(value.index())};
   if (const auto* integer = std::get_if<std::int64_t>(&value)) {

@@ -10,13 +10,13 @@
 
 #include "proto/oblique.pb.h"
 
-// Rows of an answer in chunks. A chunk is a QueryReply, whose cells follow each other.
+// Rows of an answer in chunks. A chunk is a QueryReply; its cells follow each other, row by row.
 namespace oblique::protocol {
 
-/// Codes in QueryReply.cells.
+/// Codes of the kinds of cells in QueryReply.cells.
 enum class CellKind : char { kNull = 0, kInteger = 1, kReal = 2, kText = 3 };
 
-/// One value of a row. Only the member of its kind is valid.
+/// A value of a row. Only the member of its kind is valid.
 struct Cell {
   CellKind kind = CellKind::kNull;
   std::int64_t integer = 0;
@@ -28,7 +28,7 @@ struct Cell {
 using Value = std::variant<std::monostate, std::int64_t, double, std::string>;
 using Row = std::vector<Value>;
 
-/// A short answer as a whole.
+/// A short answer that is kept as a whole.
 struct Table {
   std::vector<std::string> columns;
   std::vector<Row> rows = {};
@@ -36,19 +36,19 @@ struct Table {
 
 Value value_of(const Cell& cell);
 
-/// Whether a chunk contains the cells of as many rows as it states. Check received chunks before
-/// any other use.
+/// Returns whether a chunk has the cells of as many rows as it states. Received chunks must be
+/// checked before any other use.
 bool is_sound(const QueryReply& chunk);
 
-/// Iterates over the rows of a sound chunk, which must not change meanwhile.
+/// Iterates over the rows of a sound chunk. The chunk must not change meanwhile.
 class ChunkRows {
  public:
   explicit ChunkRows(const QueryReply& chunk);
 
-  /// Moves to the next row, at first to the first one; false after the last.
+  /// Moves to the next row, at the first call to the first row. Returns false after the last row.
   bool next();
   std::size_t columns() const { return cells_.size(); }
-  /// The value of a column in the current row.
+  /// Returns the value of a column in the current row.
   const Cell& cell(std::size_t column) const { return cells_[column]; }
 
  private:
@@ -57,7 +57,7 @@ class ChunkRows {
   std::uint64_t rows_left_;
 };
 
-/// Collects rows into chunks, value by value in the order of the columns.
+/// Collects rows into chunks. Values must be added in the order of the columns.
 class ChunkWriter {
  public:
   explicit ChunkWriter(std::vector<std::string> columns) : columns_(std::move(columns)) {}
@@ -70,10 +70,11 @@ class ChunkWriter {
   /// Ends a row, which must have a value for every column.
   void end_row() { ++rows_; }
 
-  /// Size of the cells since the last `take` [bytes].
+  /// Returns the size of the cells that were added since the last `take` [bytes].
   std::uint64_t bytes() const { return cells_.size(); }
 
-  /// Returns the rows since the last call. The caller numbers the chunk and marks the last one.
+  /// Returns the rows added since the last call. The caller must number the chunk and mark the last
+  /// one.
   QueryReply take();
 
  private:

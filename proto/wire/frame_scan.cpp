@@ -23,8 +23,8 @@ CodedInputStream stream_of(std::string_view bytes) {
 
 struct Found {
   std::size_t fields = 0;
-  std::size_t bytes = 0;  ///< of texts, packed lists and messages
-  bool is_whole = true;   ///< every message on the path is complete
+  std::size_t bytes = 0;  ///< size of texts, packed lists and messages
+  bool is_whole = true;   ///< true if every message on the path is complete
 };
 
 Found find(std::string_view message, std::span<const int> path) {
@@ -55,9 +55,9 @@ Found find(std::string_view message, std::span<const int> path) {
   return found;
 }
 
-/// Whether the recipe at the path has enough bytes for the axes that its blocks need.
+/// Returns whether the recipe at the path has enough bytes for the axes that its blocks need.
 bool has_room_for_axes(std::string_view message, std::vector<int> path) {
-  // The smallest axis has a key and a range from 0 to 0. A block has at least three axes.
+  // The smallest axis consists of a key and a range from 0 to 0. A block has at least three axes.
   constexpr std::size_t kLeastAxisBytes = 5;
   constexpr std::size_t kLeastBlockBytes = 3 * (2 + kLeastAxisBytes);
   path.push_back(Recipe::kBlocksFieldNumber);

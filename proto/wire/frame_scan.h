@@ -6,30 +6,30 @@
 
 namespace oblique::protocol {
 
-// Checks frames before they are parsed. A message of two bytes becomes an object of hundreds, so
-// parsing a malicious frame could need a hundred times its size.
+// Checks frames before they are parsed. A parsed message of two bytes may need hundreds of bytes,
+// so parsing a malicious frame could need a hundred times its size.
 
-/// Maximum size of a worker's frame [bytes], excluding the rows of a trace. Workers split their
-/// results at 1 MiB.
+/// Maximum size of a worker's frame [bytes], without a trace's rows. Workers split results at 1
+/// MiB.
 inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024;
-/// Maximum number of results in one message; workers send at most 1,000.
+/// Maximum number of results in one message. Workers send at most 1,000.
 inline constexpr std::size_t kMaxResultsAMessage = 10'000;
-/// Maximum number of leases in a heartbeat: a worker keeps at most 50,000 unacknowledged results
-/// and 1,024 batches. Checked after parsing, because a lease needs little more memory than its
+/// Maximum number of leases in a heartbeat. A worker has at most 50,000 unacknowledged results and
+/// 1,024 batches. This is checked after parsing, because a lease needs little more memory than its
 /// bytes.
 inline constexpr int kMaxLeasesAHeartbeat = 65'536;
 
-/// Whether the frame is within the limits for workers. A frame that cannot be parsed may pass.
+/// Returns whether the frame is within the limits for workers; may be true for an invalid frame.
 bool is_worker_frame_within_limits(std::string_view frame);
 
-/// Whether the recipe in a client's request has enough bytes for the axes that its blocks need. If
-/// not, it is padded with empty messages or cannot be parsed.
+/// Returns whether the recipe in a client's request has enough bytes for the axes that its blocks
+/// need. If not, the recipe is padded with empty messages or cannot be parsed.
 bool is_unpadded_request(std::string_view frame);
 
-/// The same for an encoded recipe.
+/// Returns whether an encoded recipe has enough bytes for the axes that its blocks need.
 bool is_unpadded_recipe(std::string_view recipe);
 
-/// The number of a client's request, from the beginning of its frame; 0 if it is missing.
+/// Returns the number of a client's request, from the beginning of its frame; 0 if it is missing.
 std::uint64_t request_id_of(std::string_view frame);
 
 }  // namespace oblique::protocol

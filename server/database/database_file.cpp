@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr mode_t kOwnerOnly = 0600;
 constexpr int kBusyTimeout_ms = 5000;
 
-/// The lock of a server, on a byte that SQLite does not lock.
+/// Returns the lock that marks a database as used by a server. SQLite does not lock this byte.
 struct flock servers_lock() {
   struct flock lock {};
   lock.l_type = F_WRLCK;
@@ -40,7 +40,7 @@ struct flock servers_lock() {
   return lock;
 }
 
-/// Formats the path as a URI for SQLite; escapes all except these letters.
+/// Formats the path as a URI for SQLite, and escapes the letters that have a meaning there.
 std::string as_uri(const std::string& path) {
   std::string uri = "file:";
   for (const char letter : fs::absolute(path).string()) {
@@ -57,7 +57,7 @@ DatabaseHandle open_alone(const std::string& path) {
   std::error_code none;
   const bool has_log = fs::file_size(path + "-wal", none) > 0 && !none;
   // SQLite ignores the log of an immutable database. So a database with a log is opened without
-  // locks and in exclusive mode, in which SQLite keeps the index of the log in memory.
+  // locks and in exclusive mode: SQLite then keeps the index of the log in memory.
   DatabaseHandle database =
       open_database(as_uri(path) + (has_log ? "?vfs=unix-none" : "?immutable=1"),
                     SQLITE_OPEN_READONLY | SQLITE_OPEN_URI);
@@ -116,7 +116,7 @@ std::string file_system_of(const std::string& path) {
                                             static_cast<int>(line.size())) != nullptr) {
     const std::string_view folder(mount.mnt_dir);
     const std::string prefix = std::string(folder) + (folder.ends_with('/') ? "" : "/");
-    // the last mount at a path hides earlier ones
+    // A later mount at the same path hides the earlier one.
     if (place.starts_with(prefix) && prefix.size() >= nearest.size()) {
       nearest = prefix;
       type = mount.mnt_type;
@@ -128,7 +128,8 @@ std::string file_system_of(const std::string& path) {
 bool is_network_file_system(std::string_view type) {
   constexpr std::array<std::string_view, 8> kNetwork{"nfs",    "cifs", "smb",  "ceph",
                                                      "lustre", "afs",  "gpfs", "beegfs"};
-  // The type of a FUSE file system contains the program's name; most reach other machines.
+  // The type of a FUSE file system contains the name of its program. Most of these programs access
+  // other machines; the following do not.
   constexpr std::array<std::string_view, 6> kLocalFuse{
       "fuse.mergerfs", "fuse.ntfs", "fuse.exfat", "fuse.overlay", "fuse.fuse-", "fuse.gocrypt"};
   const auto begins_type = [type](std::string_view name) { return type.starts_with(name); };
@@ -192,7 +193,7 @@ void ServerFile::check() const {
   if (exists && found.st_dev == opened_.st_dev && found.st_ino == opened_.st_ino) {
     return;
   }
-  // Other errors, such as a folder without search permission, do not show that the file is gone.
+  // Other errors, such as a folder without search permission, do not mean that the file is gone.
   if (exists || errno == ENOENT || errno == ENOTDIR || errno == ESTALE) {
     throw StorageGone(fmt::format(
         "the file {} was {} while the server used it. Nothing more is stored, and the server "

@@ -7,57 +7,57 @@
 
 #include "server/database/sqlite.h"
 
-// Opening, locking and completing database files.
+// Functions that open, lock and complete database files.
 namespace oblique::server {
 
 /// Throws StorageError when `path` exists and is not a regular file.
 void check_path(const std::string& path);
 
-/// Opens the database at `path` for reading only; does not check whether it is ours. SQLite may
-/// create an index of the write-ahead log beside it. In a read-only folder it reads the database
-/// and the rows in the log without that file. Throws StorageError if there is no such file or it
-/// cannot be opened.
+/// Opens the database at `path` for reading only, without checking whether it is ours. SQLite may
+/// create an index of the write-ahead log beside the database. In a read-only folder it reads the
+/// rows in the log without that file. Throws StorageError if the file does not exist or cannot be
+/// opened.
 DatabaseHandle open_for_reading(const std::string& path);
 
-/// As `open_for_reading`; also throws StorageError, with what was found, unless the file is a
-/// database of ours with tables.
+/// Works like `open_for_reading`, and also throws StorageError, which describes the file, unless
+/// the file is a database of ours with tables.
 DatabaseHandle open_stored(const std::string& path);
 
-/// Type of the file system that holds `path`, as reported by the system, such as "ext4" or
-/// "fuse.sshfs". `path` need not exist.
+/// Returns the type of the file system that holds `path`, as the system reports it, such as "ext4"
+/// or "fuse.sshfs". `path` need not exist.
 std::string file_system_of(const std::string& path);
 
-/// Whether other machines may write to files on this type of file system, such as "nfs4".
+/// Returns whether other machines may write to files on this type of file system, such as "nfs4".
 bool is_network_file_system(std::string_view type);
 
-/// Why a database at `path` is not safe on its file system, or an empty text. A network file system
-/// lacks the locks and shared memory that SQLite's write-ahead log needs, so two machines could
-/// write at once and damage the file. `path` need not exist.
+/// Returns why a database at `path` is not safe on its file system, or an empty text. A network
+/// file system lacks the locks and shared memory that SQLite's write-ahead log needs, so two
+/// machines could write at once and damage the file. `path` need not exist.
 std::string network_disk_error(const std::string& path);
 
-/// Returns `path`. Throws StorageError if it is on a network disk and these are not allowed.
+/// Returns `path`. Throws StorageError for a network disk, unless `allows_network_disk`.
 const std::string& path_on_own_disk(const std::string& path, bool allows_network_disk);
 
-/// Whether a server has the database at `path` open; false if the file cannot be opened. Takes no
+/// Returns whether a server has the database open; false if the file cannot be opened. Takes no
 /// lock.
 bool is_in_use(const std::string& path);
 
-/// The file of a database that a server writes, locked against other servers. Data written to a
-/// file after it was deleted, renamed or replaced is lost; `check` detects this.
+/// The database file of a server, locked against other servers. If the file is deleted, renamed or
+/// replaced, data written later is lost; `check` detects this.
 class ServerFile {
  public:
-  /// Opens the file at `path`, or creates it with mode 0600. This must outlive every connection,
-  /// because closing the file releases SQLite's locks. Throws StorageError.
+  /// Opens the file at `path`, or creates it with mode 0600. This object must outlive every
+  /// connection, because closing the file releases SQLite's locks. Throws StorageError.
   explicit ServerFile(const std::string& path);
   ~ServerFile();
   ServerFile(const ServerFile&) = delete;
   ServerFile& operator=(const ServerFile&) = delete;
 
-  /// Whether the file was created.
+  /// Returns whether this object has created the file.
   bool is_new() const { return is_new_; }
 
-  /// Throws StorageGone unless the file at the path has the device and inode of the opened one. The
-  /// contents are not compared.
+  /// Throws StorageGone unless the file at the path has the same device and inode as the opened
+  /// file. The contents are not compared.
   void check() const;
 
  private:
@@ -67,8 +67,8 @@ class ServerFile {
   struct stat opened_ {};
 };
 
-/// A database that is not complete yet, and SQLite's files beside it. The destructor deletes them,
-/// so an incomplete database never has the final name.
+/// A database that is not complete yet, with SQLite's files beside it. The destructor deletes these
+/// files, so an incomplete database never has the final name.
 class DraftFile {
  public:
   /// Creates an empty file with mode 0600. Throws StorageError.

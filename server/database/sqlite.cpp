@@ -29,8 +29,8 @@ constexpr const char* kWayOut =
   throw StorageError("the database failed: " + reason);
 }
 
-/// Computes the CRC-32 of bytes that are added in small pieces. Buffers them, because a call of
-/// zlib costs as much as some hundred bytes.
+/// Computes the CRC-32 of bytes that are added in small pieces. It buffers them, because each call
+/// of zlib costs as much as some hundred bytes.
 class Crc {
  public:
   void add(const void* bytes, std::size_t size) {
@@ -59,7 +59,7 @@ class Crc {
         break;
       case SQLITE_FLOAT: {
         const double real = sqlite3_value_double(value);
-        // SQLite may drop the sign of a zero.
+        // Both zeros have the same checksum, because SQLite may drop the sign of a zero.
         add_word('r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
         break;
       }
@@ -108,7 +108,7 @@ void check_sync(sqlite3* database, int code) {
 
 DatabaseHandle open_database(const std::string& path, int flags) {
   sqlite3* raw = nullptr;
-  // One thread at a time uses a connection, so SQLite need not lock.
+  // SQLite need not lock the connection, because only one thread at a time uses it.
   const int code = sqlite3_open_v2(path.c_str(), &raw,
                                    flags | SQLITE_OPEN_EXRESCODE | SQLITE_OPEN_NOMUTEX, nullptr);
   DatabaseHandle database(raw);
@@ -212,7 +212,7 @@ Transaction::Transaction(sqlite3* database) : database_(database) {
 }
 
 Transaction::~Transaction() {
-  // SQLite may have rolled back already, for example on a full disk.
+  // SQLite may have rolled back already, for example when the disk was full.
   if (open_ && sqlite3_get_autocommit(database_) == 0) {
     sqlite3_exec(database_, "ROLLBACK", nullptr, nullptr, nullptr);
   }

@@ -26,8 +26,8 @@ class StorageGone : public StorageError {
   using StorageError::StorageError;
 };
 
-/// Throws StorageGone, which names the file of the connection, if `code` is the extended result
-/// code of a failed fsync.
+/// If `code` is the extended result code of a failed fsync, throws StorageGone, which names the
+/// file of the connection.
 void check_sync(sqlite3* database, int code);
 
 struct CloseDatabase {
@@ -47,7 +47,7 @@ DatabaseHandle open_database(const std::string& path, int flags);
 /// Runs statements that return no rows. Throws StorageError.
 void execute(sqlite3* database, const std::string& sql);
 
-/// Bytes to bind as a blob.
+/// Bytes that are bound as a blob.
 struct Blob {
   std::string_view bytes;
 };
@@ -55,7 +55,7 @@ struct Blob {
 /// One prepared statement. Bindings count from 1, columns from 0, as in SQLite.
 class Statement {
  public:
-  /// Throws StorageError when `sql` does not compile.
+  /// Throws StorageError if `sql` does not compile.
   Statement(sqlite3* database, std::string_view sql);
 
   void bind(int index, double value);  ///< a NaN is stored as NULL
@@ -65,9 +65,9 @@ class Statement {
   void bind(int index, Integer value) {
     check(sqlite3_bind_int64(statement_.get(), index, static_cast<std::int64_t>(value)));
   }
-  /// Binds a text without copying it; it must not change until the statement is reset.
+  /// Binds a text without copying it. The text must not change until the statement is reset.
   void bind_lasting(int index, std::string_view text);
-  /// Binds the value of column `column` of `row`, with its type.
+  /// Binds the value in column `column` of `row`, with its type.
   void bind_column(int index, const Statement& row, int column);
 
   /// Binds the values to the parameters 1, 2 and so on.
@@ -77,7 +77,7 @@ class Statement {
     (bind(++index, values), ...);
   }
 
-  /// Advances to the next row; false after the last one. Throws StorageError.
+  /// Moves to the next row. Returns false after the last row. Throws StorageError.
   bool step();
   /// Runs a statement that returns no rows and makes it ready for the next bindings.
   void run();
@@ -86,14 +86,14 @@ class Statement {
 
   int columns() const { return sqlite3_column_count(statement_.get()); }
   bool is_null(int column) const { return type(column) == SQLITE_NULL; }
-  /// The type of a value, as SQLITE_INTEGER.
+  /// Returns the type of a value, such as SQLITE_INTEGER.
   int type(int column) const { return sqlite3_column_type(statement_.get(), column); }
   std::int64_t integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
   std::uint64_t number(int column) const { return static_cast<std::uint64_t>(integer(column)); }
   double real(int column) const { return sqlite3_column_double(statement_.get(), column); }
-  /// The bytes of a text or blob.
+  /// Returns the bytes of a text or blob.
   std::string text(int column) const { return std::string(bytes(column)); }
-  /// The same without a copy, valid until the next call of `step` or `reset`.
+  /// Returns the bytes without a copy. They are valid until the next call of `step` or `reset`.
   std::string_view bytes(int column) const;
 
  private:
@@ -106,8 +106,7 @@ class Statement {
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
 };
 
-/// Runs one statement that returns no rows, with these values bound to its parameters. Throws
-/// StorageError.
+/// Runs one statement that returns no rows, with the values bound. Throws StorageError.
 template <class... Values>
 void execute_with(sqlite3* database, std::string_view sql, const Values&... values) {
   Statement statement(database, sql);
@@ -115,7 +114,7 @@ void execute_with(sqlite3* database, std::string_view sql, const Values&... valu
   statement.run();
 }
 
-/// A transaction, which the destructor rolls back unless it was committed.
+/// A transaction. The destructor rolls it back unless it was committed.
 class Transaction {
  public:
   explicit Transaction(sqlite3* database);
@@ -123,7 +122,7 @@ class Transaction {
   Transaction(const Transaction&) = delete;
   Transaction& operator=(const Transaction&) = delete;
 
-  /// Throws StorageError after rolling back.
+  /// Commits. If that fails, rolls back and throws StorageError.
   void commit();
 
  private:
@@ -138,7 +137,7 @@ inline constexpr std::int32_t kSchemaVersion = 13;
 enum class DatabaseKind { kEmpty, kOurs };
 
 /// Returns whether an open database is empty or ours. Throws StorageError, with the reason, for a
-/// foreign file or another schema. `path` is for the messages.
+/// foreign file or another schema. Error messages contain `path`.
 DatabaseKind identify(sqlite3* database, const std::string& path);
 
 }  // namespace oblique::server

@@ -17,13 +17,13 @@ namespace oblique::server {
 namespace {
 
 constexpr std::chrono::milliseconds kTick{100};
-/// At the end, time to send remaining output.
+/// Maximum time for sending the remaining output when the server ends.
 constexpr std::chrono::milliseconds kLinger{500};
-/// Longest time for the messages of one port in one turn of the loop.
+/// Maximum time for the messages of one port in one turn of the loop.
 constexpr std::chrono::milliseconds kShareOfTurn{5};
-/// Time in which peers can still query the reason after the database is gone.
+/// Time after the loss of the database in which the server answers requests with the reason.
 constexpr std::chrono::seconds kFarewell{3};
-/// At the end, longest time to read messages that have arrived.
+/// Maximum time for reading messages that have already arrived when the server ends.
 constexpr std::chrono::milliseconds kLongestLastRead{1000};
 
 Instant now() {
@@ -33,8 +33,8 @@ Instant now() {
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
-/// Null without HTTP. If the address is in use and the server may run without HTTP, logs the reason
-/// and returns null.
+/// Returns null without HTTP. If the address is in use and the server may run without HTTP, logs
+/// the reason and returns null.
 std::unique_ptr<Web> make_web(const LoopSettings& settings) {
   if (!settings.web) {
     return nullptr;
@@ -93,7 +93,7 @@ EventLoop::EventLoop(LoopSettings settings)
   service.clients.access = name_of(access_.mode());
   service.last_study_id = store_.last_study_id();
   service.last_worker_id = store_.last_worker_id();
-  // Above every number of an earlier run, even if the clock was set back.
+  // Lease numbers are above all numbers of earlier runs, even if the clock was set back.
   service.scheduler.first_lease_id = store_.count_start() << 40U;
   Ports& ports = *this;
   service_.emplace(service, ports, store_.studies(), now());
@@ -136,7 +136,7 @@ void EventLoop::log(Severity severity, const std::string& text) {
 // ---- The loop ----------------------------------------------------------------------------------
 
 LoopEnd EventLoop::run(int stop_fd, const std::function<void()>& take_stop) {
-  writer_.resume_deletions();  // from here on only the writer uses the store
+  writer_.resume_deletions();  // from here on only the writer's thread uses the store
   auto next_tick = Clock::now();
   std::array<pollfd, 4> items{{{network_.descriptor(), POLLIN, 0},
                                {web_ ? web_->descriptor() : -1, POLLIN, 0},
@@ -294,8 +294,8 @@ LoopEnd EventLoop::finish() {
   return {lost, service_->storage_is_gone()};
 }
 
-/// libzmq drops unread messages when a connection ends. Clients that got a reply at the end have
-/// time to read it; most then disconnect.
+/// Waits until clients have read their last reply, because libzmq drops unread messages when a
+/// connection ends. Most clients disconnect after the reply.
 void EventLoop::wait_for_readers() {
   const auto until = Clock::now() + kLinger;
   const auto is_there = [this](const auto& client) { return network_.is_connected(client); };

@@ -29,8 +29,7 @@
 
 namespace oblique::server {
 
-/// Queue of functions that other threads want to run on the event loop. A descriptor wakes the
-/// loop.
+/// A queue of functions to run on the event loop's thread. A descriptor wakes the loop.
 class CompletionQueue {
  public:
   using Completion = std::function<void()>;
@@ -41,7 +40,7 @@ class CompletionQueue {
     completions_.push_back(std::move(completion));
     woken_.wake();
   }
-  /// Called by the loop: runs all queued functions.
+  /// Runs all queued functions. The event loop calls it.
   void run() {
     woken_.clear();
     std::vector<Completion> completions;
@@ -53,7 +52,7 @@ class CompletionQueue {
       completion();
     }
   }
-  /// Readable when the queue is not empty.
+  /// Becomes readable when the queue is not empty.
   int descriptor() const { return woken_.descriptor(); }
 
  private:
@@ -62,11 +61,11 @@ class CompletionQueue {
   std::vector<Completion> completions_;  // guarded by mutex_
 };
 
-/// Runs long checks one after another on a thread of its own. Callers bound the number that wait.
-/// The destructor drops waiting checks and waits for the running one.
+/// Runs long checks one after another on its own thread. Callers limit the number of waiting
+/// checks. The destructor drops waiting checks and waits for the running one.
 class CheckThread {
  public:
-  /// `done` is called on this thread after each check.
+  /// `done` is called on this object's thread after each check.
   explicit CheckThread(std::function<void(Ports::Completion)> done)
       : done_(std::move(done)), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
@@ -92,58 +91,58 @@ class CheckThread {
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::deque<Ports::Check> waiting_;  // guarded by mutex_
-  std::jthread thread_;               // last: it uses the other members
+  std::jthread thread_;               // declared last, because it uses the other members
 };
 
-/// The state of the loop, for the service manager.
+/// The state of the loop, which is reported to the service manager.
 struct LoopState {
   enum class Stage { kRuns, kDrains, kEnds };
   Stage stage;
   std::size_t workers;
-  std::size_t leases;  ///< batches that are with workers
+  std::size_t leases;  ///< number of batches that workers hold
 };
 
 struct LoopSettings {
-  std::string database;              ///< path of the file
-  bool allow_network_disk = false;   ///< allows a file on a network file system
-  AccessSettings access;             ///< of both ports
+  std::string database;              ///< path of the database file
+  bool allow_network_disk = false;   ///< if true, the file may be on a network file system
+  AccessSettings access;             ///< access settings of both ports
   std::string worker_port = "7601";  ///< "*": chosen by the system
   std::string client_port = "7600";
   QueryPoolSettings queries;
   NetworkLimits network;
-  std::optional<WebSettings> web;  ///< database and solver version are set from the server's
-  /// Time to wait for running batches on a request to stop; 0: none.
+  std::optional<WebSettings> web;  ///< EventLoop sets database and solver version
+  /// Time to wait for leased batches after a request to stop; 0: none.
   std::chrono::milliseconds drain{0};
-  /// Called on the loop's thread several times a second, and once as the loop ends.
+  /// Called on the loop's thread several times a second, and once when the loop ends.
   std::function<void(const LoopState&)> on_turn = [](const LoopState&) {};
-  ServiceSettings service;  ///< solver_version must be set; the rest comes from the database
+  ServiceSettings service;  ///< solver_version must be set; other values come from the database
 };
 
-/// Result of a run of the loop.
+/// Outcome of a run of the loop.
 struct LoopEnd {
-  std::size_t lost_writes;  ///< changes that could not be stored
-  bool lost_database;       ///< the file was deleted or replaced
+  std::size_t lost_writes;  ///< number of changes that could not be stored
+  bool lost_database;       ///< true if the file was deleted or replaced, or a sync failed
 };
 
 /// The server: a loop that passes input from network, HTTP, writer, query pool and check thread to
-/// the service. Logs to spdlog's default logger.
+/// the service. It logs to spdlog's default logger.
 class EventLoop final : private Ports {
  public:
-  /// Opens the database and binds both ports. Throws StorageError, also for a file on a network
-  /// file system; solver::InputError for an address that is not allowed; std::runtime_error for a
-  /// port that cannot be bound.
+  /// Opens the database and binds both ports. Throws StorageError if the database cannot be opened
+  /// or is on a network file system; solver::InputError for an address that is not allowed;
+  /// std::runtime_error if a port cannot be bound.
   explicit EventLoop(LoopSettings settings);
 
-  /// ZeroMQ endpoints with the ports in use.
+  /// Return the ZeroMQ endpoints, with the actual ports.
   std::string client_endpoint() const { return network_.endpoint(clients_); }
   std::string worker_endpoint() const { return network_.endpoint(workers_); }
-  /// Such as http://127.0.0.1:7602; empty: without HTTP.
+  /// Returns an address such as http://127.0.0.1:7602; empty without HTTP.
   std::string http_url() const { return web_ ? web_->url() : std::string(); }
-  /// The address of the page with its token; empty: without HTTP.
+  /// Returns the address of the page with its token; empty without HTTP.
   std::string page_url() const { return web_ ? web_->page_url() : std::string(); }
 
-  /// Runs until `stop_fd` becomes readable or the database is gone. Then notifies workers, stores
-  /// and acknowledges received results, and returns. With `drain` it first waits for running
+  /// Runs until `stop_fd` becomes readable or the database is lost. Then notifies workers, stores
+  /// and acknowledges received results, and returns. With `drain` it first waits for leased
   /// batches; `take_stop` must read `stop_fd`, so that a second signal ends the wait.
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop = {});
 
@@ -183,7 +182,7 @@ class EventLoop final : private Ports {
 
   const std::chrono::milliseconds drain_;
   const std::function<void(const LoopState&)> on_turn_;
-  std::optional<Clock::time_point> drain_until_;  ///< none: not draining
+  std::optional<Clock::time_point> drain_until_;  ///< nothing if it does not drain
   AccessControl access_;
   Store store_;
   CompletionQueue completions_;
@@ -195,7 +194,7 @@ class EventLoop final : private Ports {
   Network::Port clients_;
   std::unique_ptr<Web> web_;
   bool is_ending_ = false;
-  std::vector<std::string> last_answered_;  ///< clients that got a message at the end
+  std::vector<std::string> last_answered_;  ///< clients to which a message was sent at the end
   std::optional<Service> service_;
 };
 

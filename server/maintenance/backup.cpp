@@ -28,7 +28,7 @@ void copy_pages(sqlite3* from, sqlite3* to, const std::string& path) {
   if (backup == nullptr) {
     throw StorageError("cannot write the copy " + path + ": " + sqlite3_errmsg(to));
   }
-  // Copies all pages in one step, so that the copy has one state even while a server writes.
+  // Copies all pages in one step, so that the copy is consistent even while a server writes.
   const int step = sqlite3_backup_step(backup, -1);
   const int end = sqlite3_backup_finish(backup);
   if (step != SQLITE_DONE || end != SQLITE_OK) {
@@ -48,17 +48,17 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   return found;
 }
 
-/// A table with ascending integer keys, of which some or all rows are copied.
+/// A table with ascending integer keys, and which of its rows to copy.
 struct KeyedRows {
   std::string table;
   std::string key;
-  std::string condition = "1";    ///< SQL condition for the rows to copy
-  std::string is_sound = "1";     ///< SQL condition for an undamaged row
-  std::int64_t before_first = 0;  ///< any number below all keys
+  std::string condition = "1";    ///< SQL condition that selects the rows to copy
+  std::string is_sound = "1";     ///< SQL condition that is true for an undamaged row
+  std::int64_t before_first = 0;  ///< a number below all keys
 };
 
-/// Inserts the columns of a row after the first two. False if the row violates the schema and so is
-/// damaged. Throws std::runtime_error if the copy cannot be written.
+/// Inserts a row. Its first two columns are not inserted. Returns false if the row violates the
+/// schema and is therefore damaged. Throws std::runtime_error if the copy cannot be written.
 bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   for (int column = 2; column < row.columns(); ++column) {
     insert.bind_column(column - 1, row, column);
@@ -76,11 +76,11 @@ bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   }
 }
 
-/// Copies the readable rows by ascending key and returns their number. After an unreadable row it
-/// looks for the next readable one in growing steps, so that a long gap costs few attempts and a
-/// short gap few readable rows.
+/// Copies the readable rows in the order of their keys and returns their number. After an
+/// unreadable row, skips keys in steps that double, so that a long gap costs few attempts and a
+/// short gap loses few readable rows.
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
-  // Larger than every key in use.
+  // Maximum step, larger than every key in use.
   constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
   const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
   const std::vector<std::string> found = texts(from, columns_sql);
@@ -88,7 +88,7 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
     return 0;  // the table is lost
   }
   std::vector<std::string> columns;
-  std::vector<std::string> lost;  // lost columns; the row then has no checksum
+  std::vector<std::string> lost;  // columns that are lost; then rows get no checksum
   for (const std::string& column : texts(to, columns_sql)) {
     (std::ranges::count(found, column) > 0 ? columns : lost).push_back(column);
   }
@@ -133,7 +133,7 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies", .key = "study_id"}, saved);
   copy_rows(from, to, {.table = "models", .key = "model_id"}, saved);
   copy_rows(from, to, {.table = "workers", .key = "worker_id"}, saved);
-  // Skips rows of lost studies, which have no meaning without the recipe.
+  // Skips rows of lost studies, because they mean nothing without the recipe.
   for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
               {.table = "results",
@@ -146,7 +146,7 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
 }
 
 /// Removes or repairs references to lost rows, and counts completed points. Studies and models with
-/// a damaged value stay without a checksum; `check` compares their rows with the recipes.
+/// a damaged value lose their checksum; `check` compares their rows with the recipes.
 void mend(sqlite3* database) {
   execute(database, fmt::format("UPDATE studies SET checksum = NULL WHERE checksum <> {};"
                                 "UPDATE models SET checksum = NULL WHERE checksum <> {};",
@@ -154,7 +154,7 @@ void mend(sqlite3* database) {
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
           // Rows keep the number of a lost worker, so that their checksums stay right. A lost
-          // worker gets the solver version of all other workers if they have only one.
+          // worker gets the solver version of the other workers if all of these have the same one.
           "INSERT INTO workers"
           " (worker_id, name, threads, solver_version, instruction_set, joined_at)"
           " SELECT DISTINCT worker_id, 'lost with a damaged file', 1,"
@@ -205,7 +205,7 @@ void back_up(const std::string& from, const std::string& to) {
 Salvaged salvage(const std::string& from, const std::string& to) {
   check_is_new(to);
   const DatabaseHandle source = open_for_reading(from);
-  // Lets SQLite read a file that is shorter than its header states.
+  // Makes SQLite read a file that is shorter than its header states.
   execute(source.get(), "PRAGMA writable_schema = ON");
   check_is_salvageable(source.get(), from);
   const DraftFile draft(to + ".part");

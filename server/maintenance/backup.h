@@ -7,26 +7,26 @@
 
 namespace oblique::server {
 
-/// Copies the database at `from` to `to` in its state at one instant, while a server may write to
-/// it. The copy gets its name only when it is complete, checked and synced. Throws StorageError
-/// with the reason: `from` is no database of ours, `to` exists, the disk is full, or a page is
+/// Copies the database at `from` to `to`, in its state at one instant, while a server may write to
+/// it. The copy gets its name only when it is complete, checked and synced. Throws StorageError,
+/// with the reason, if `from` is no database of ours, `to` exists, the disk is full, or a page is
 /// damaged.
 void back_up(const std::string& from, const std::string& to);
 
-/// As `back_up`, into a draft. `to` is the name of the copy in error messages.
+/// Copies like `back_up`, but into a draft. `to` is the name of the copy in error messages.
 void copy_into(const DraftFile& draft, const std::string& from, const std::string& to);
 
-/// Numbers of readable rows of a damaged database.
+/// Numbers of readable rows in a damaged database.
 struct Salvaged {
   std::uint64_t studies = 0;
   std::uint64_t results = 0;
-  std::uint64_t unreadable_places = 0;  ///< number of gaps: damaged pages or bad values
+  std::uint64_t unreadable_places = 0;  ///< number of gaps: damaged pages or invalid values
 };
 
-/// Makes a sound database `to` from the readable rows of `from`. After a gap it skips at most as
-/// many readable rows as were lost. A server solves points without a row again. Does not change
-/// `from`, which no server may use. Throws StorageError if `to` exists or `from` cannot be opened,
-/// std::runtime_error if `to` cannot be written.
+/// Makes a sound database `to` from the readable rows of `from`. At each gap it loses at most as
+/// many readable rows as were unreadable. A server solves points without a row again. Does not
+/// change `from`, which no server may use meanwhile. Throws StorageError if `to` exists or `from`
+/// cannot be opened, and std::runtime_error if `to` cannot be written.
 Salvaged salvage(const std::string& from, const std::string& to);
 
 }  // namespace oblique::server

@@ -29,7 +29,7 @@ void append(std::vector<std::string>& to, sqlite3* database, const std::string& 
   }
 }
 
-/// The columns that `recipe_fault` reads, which must be the first ones of a row.
+/// The columns that `recipe_fault` reads. They must be the first columns of a row.
 constexpr const char* kRecipeColumns = "point, model_id, H, mu, e";
 
 /// Checks studies one after another, each with all its rows in one pass.
@@ -79,7 +79,7 @@ class StudyCheck {
     study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
   }
 
-  /// Checks for values that a server never stores; they could prevent a start or a display.
+  /// Reports values that a server never stores, because they could prevent its start or a display.
   void check_terms() {
     constexpr std::int64_t kLongestTime = 64;
     for (const std::string& error :
@@ -124,10 +124,10 @@ class StudyCheck {
     return points;
   }
 
-  /// The first difference between the current row and the recipe, as a part of a sentence; empty if
-  /// they agree. Compares point, H, mu, e and model, with the tolerance of is_close
-  /// (proto/recipe/point_table.h) for values that another machine computed. Fast for rows in the
-  /// order of their points.
+  /// Returns the first difference between the current row and the recipe, as a part of a sentence;
+  /// empty if they agree. Compares point, H, mu, e and model, with the tolerance of is_close
+  /// (proto/recipe/point_table.h), because another machine computed the values. Fast for rows in
+  /// the order of their points.
   std::string recipe_fault(const protocol::PointTable& table) {
     if (rows_.number(0) >= table.size()) {  // a negative number becomes a large one
       return "the study has no such point";
@@ -160,8 +160,8 @@ class StudyCheck {
   }
 
   /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can
-  /// complete a point without a row. In a study with `counted` = 0 another program deleted rows, so
-  /// its ranges and state may be outdated.
+  /// complete a point without a row. If `counted` is 0, another program has deleted rows, so ranges
+  /// and state may be outdated.
   void check_completed(const StudyTable& table, const IntervalSet& rows) {
     const bool is_counted = studies_.integer(9) != 0;
     const IntervalSet completed =
@@ -194,9 +194,9 @@ class StudyCheck {
   Statement studies_;
   Statement rows_;
   Statement definition_;
-  // model number in the recipe, and number of its row
+  // model number in the recipe, and number of the row of `models`, that were last equal
   std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};
-  std::string name_;  // of the current study
+  std::string name_;  // name of the current study
   std::vector<std::string> study_faults_;
   std::vector<std::string> row_faults_;
   std::uint64_t all_rows_ = 0;
@@ -210,7 +210,7 @@ std::vector<std::string> faults_of_pages(sqlite3* database) {
   try {
     append(found, database, "PRAGMA integrity_check(20)");
   } catch (const StorageError& error) {
-    return {error.what()};  // too damaged for SQLite's check
+    return {error.what()};  // the file is too damaged for SQLite's own check
   }
   return found == std::vector<std::string>{"ok"} ? std::vector<std::string>{} : found;
 }
@@ -232,7 +232,7 @@ std::string row_fault_sql() {
 
 Diagnosis diagnose_contents(sqlite3* database) {
   Diagnosis found;
-  // The definition of a table could contain endless computations.
+  // The definition of a changed table could contain endless computations, so its rows are not read.
   for (const std::string& table : differing_tables(database)) {
     found.faults.push_back(fmt::format(
         "the table {} is missing or has other columns, so no server can use this file: `oblique "
@@ -264,9 +264,9 @@ Diagnosis diagnose(const std::string& path) {
   const DatabaseHandle opened = open_stored(path);
   sqlite3* database = opened.get();
   if (auto faults = faults_of_pages(database); !faults.empty()) {
-    return {std::move(faults), {}};  // damaged pages make other checks meaningless
+    return {std::move(faults), {}};  // with damaged pages, other checks mean nothing
   }
-  execute(database, "BEGIN");  // so that rows and counts agree while a server writes
+  execute(database, "BEGIN");  // makes rows and counts consistent while a server writes
   return diagnose_contents(database);
 }
 

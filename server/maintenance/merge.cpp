@@ -21,10 +21,9 @@
 namespace oblique::server {
 namespace {
 
-/// Opens the copy of a source. Throws StorageError for tables with other columns and for damaged
-/// rows.
+/// Opens the copy of a source. Throws StorageError for other columns and for damaged rows.
 DatabaseHandle open_sound_source(const std::string& path) {
-  // A stored value was part of one message, so it cannot be longer.
+  // Maximum size of a stored value, which cannot be longer than the message that it was part of.
   constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
   DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
   sqlite3_limit(database.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
@@ -48,10 +47,9 @@ StudyRow study_in(const Statement& row) {
   return {row.number(0), row.text(1), StudyTable(row.text(2), row.number(3))};
 }
 
-// Parameters of the statements below: ?1 the study's number in the source, ?2 in the target.
+// In the statements below, ?1 is the study's number in the source and ?2 its number in the target.
 
-/// Selects points that are solved in both databases with different outputs, except the solver's
-/// time.
+/// Selects points solved in both databases with different outputs, apart from the solver's time.
 std::string differing_sql() {
   const auto outputs = [](const char* table) {
     std::string names;
@@ -89,15 +87,15 @@ std::string insert_sql() {
       fmt::join(result_columns(), ", "), fmt::join(values, ", "));
 }
 
-/// Merges one source within a transaction of the caller.
+/// Merges one source. The caller provides the transaction.
 class SourceMerge {
  public:
-  /// `database` is the connection to the target, to which `source` was attached.
+  /// `database` is the connection to the target. `source` must be attached to it.
   SourceMerge(sqlite3* database, sqlite3* source, const std::string& rename_prefix, Merged& merged)
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
   void run() {
-    // source studies by number in the target
+    // numbers of studies in the source, each with its study in the target
     std::vector<std::pair<std::uint64_t, StudyRow>> places;
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
     while (list.step()) {
@@ -116,9 +114,9 @@ class SourceMerge {
   }
 
  private:
-  /// Returns the number of the target's study for `study`. Tries the study's own name, then the
-  /// name with the prefix. Creates a study if the name is free; unites the studies if one recipe
-  /// begins with the other.
+  /// Returns the target's study for `study`. Tries the study's own name, and then the name with the
+  /// prefix. Creates a study if the name is free; unites the studies if one recipe begins with the
+  /// other.
   StudyRow place_of(const StudyRow& study) {
     std::string conflict;
     for (const std::string& name : {study.name, rename_prefix_ + study.name}) {
@@ -175,7 +173,7 @@ class SourceMerge {
     return {known.id, known.name, study.table};
   }
 
-  /// All results of a study must come from one solver version.
+  /// All results of a study must come from the same solver version.
   void refuse_other_version(std::uint64_t source_id, const StudyRow& known) const {
     Statement other(database_,
                     "SELECT theirs.solver_version, ours.solver_version"
@@ -193,8 +191,8 @@ class SourceMerge {
     }
   }
 
-  /// Copies missing models and workers, and makes the temporary tables `model_map` and `worker_map`
-  /// from numbers in the source to numbers in the target.
+  /// Copies missing models and workers. Makes the temporary tables `model_map` and `worker_map`,
+  /// which map numbers in the source to numbers in the target.
   void copy_models_and_workers() const {
     const auto copy = [&](const std::string& name, const std::string& columns,
                           const std::string& identity) {
@@ -243,7 +241,7 @@ class SourceMerge {
       ranges.add(target.id, points);
     });
     ranges.flush();
-    // If another program deleted rows of the source, its ranges do not match its rows.
+    // If another program deleted rows of the source, the source's ranges do not match its rows.
     execute_with(database_,
                  "UPDATE main.studies SET counted = 0 WHERE study_id = ?1 AND EXISTS"
                  " (SELECT 1 FROM source.studies WHERE study_id = ?2 AND NOT counted)",
@@ -271,7 +269,7 @@ Merged Merger::merge(const std::string& source, const std::string& rename_prefix
       sqlite3_exec(database, "DETACH source", nullptr, nullptr, nullptr);
     };
     const std::unique_ptr<sqlite3, decltype(detach)> attached(target_.connection(), detach);
-    // SQLite writes changed pages beyond this cache to the log.
+    // Limits the memory of the transaction: SQLite writes pages beyond this cache to the log.
     execute(target_.connection(), "PRAGMA main.cache_size = -65536");
     target_.write([&] {
       SourceMerge(target_.connection(), opened.get(), rename_prefix, merged).run();

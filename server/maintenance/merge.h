@@ -9,16 +9,16 @@
 
 namespace oblique::server {
 
-/// Result of merging one database.
+/// The outcome of merging one database.
 struct Merged {
   std::uint64_t studies_added = 0;
-  std::uint64_t studies_united = 0;  ///< studies of the same name with a matching recipe
-  /// united studies that grew, because the source had more points
+  std::uint64_t studies_united = 0;  ///< number of studies with the same name and a matching recipe
+  /// number of united studies that grew, because the source had more points
   std::uint64_t studies_grown = 0;
   std::uint64_t results_added = 0;
-  std::uint64_t results_known = 0;      ///< points that already had a result, which was kept
-  std::uint64_t failures_replaced = 0;  ///< added results that replaced a failure
-  /// known results that differ: solved in both, other outputs
+  std::uint64_t results_known = 0;      ///< points that already had a result; they keep it
+  std::uint64_t failures_replaced = 0;  ///< number of added results that replaced a failure
+  /// number of points that both databases have solved with different outputs
   std::uint64_t results_differing = 0;
   std::vector<std::string> remarks;  ///< sentences, for example about the first differing results
 };
@@ -29,10 +29,10 @@ class MergeRefused : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Merges studies and results of other databases into one. Studies of the same name are united if
-/// their recipes are equal or one begins with the other, as after growth. Rows of the target are
-/// kept, except that a solved row replaces a failed one. Sources are only read and may be used by a
-/// server; the target must not be.
+/// Merges studies and results of other databases into a target. Studies of the same name are united
+/// if their recipes are equal or one begins with the other, as after growth. Rows of the target are
+/// kept, except that a solved row replaces a failed row. Sources are only read, and a server may
+/// use them; no server may use the target.
 class Merger {
  public:
   /// Opens or creates the target and locks it against servers. Throws StorageError.
@@ -46,11 +46,11 @@ class Merger {
   /// cannot be read or written and for damaged rows, and MergeRefused.
   Merged merge(const std::string& source, const std::string& rename_prefix = {});
 
-  /// Moves all changes from the log into the target's file. False if a reader prevents it.
+  /// Moves all changes from the log into the target's file. Returns false if a reader prevents it.
   bool finish() { return target_.merge_log(); }
 
  private:
-  Store target_;  // holds the lock
+  Store target_;  // this object also holds the lock
   std::string path_;
 };
 

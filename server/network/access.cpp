@@ -55,8 +55,8 @@ protocol::KeyPair read_server_key(const std::string& path) {
 
 using Keys = std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>>;
 
-/// The names of `keys` that are missing in `others` or differ there, after `title`; empty if there
-/// are none.
+/// Returns `title` and the names of `keys` that `others` lacks or has changed; empty if there are
+/// none.
 std::string names_of_others(const char* title, const Keys& keys, const Keys& others) {
   std::string names;
   for (const auto& [key, identity] : keys) {
@@ -128,14 +128,14 @@ class KeyList {
   Keys keys_;
   std::optional<std::string> file_;  // content at the last read
   int empty_reads_ = 0;              // number of empty reads in a row
-  std::string fault_;                // why the last read failed; empty if it did not
+  std::string fault_;                // reason why the last read failed; empty if it succeeded
 };
 
 bool KeyList::reload() {
   constexpr int kEmptyReads = 4;
   constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
   try {
-    // Parse only a changed file, because thousands of keys take long.
+    // Parses the file only if it has changed, because parsing thousands of keys takes long.
     std::optional file = protocol::read_small_file(path_, "the list of keys", kMaxBytes);
     if (file == file_ && empty_reads_ == 0 && fault_.empty()) {
       return false;
@@ -144,7 +144,7 @@ bool KeyList::reload() {
     Keys keys = read();
     empty_reads_ = keys.empty() ? empty_reads_ + 1 : 0;
     if (keys.empty() && empty_reads_ < kEmptyReads) {
-      return false;  // an editor may empty the file before it writes
+      return false;  // an editor may empty the file before it writes the new text
     }
     const bool had_fault = !std::exchange(fault_, {}).empty();
     keys.swap(keys_);

@@ -12,20 +12,20 @@
 
 namespace oblique::server {
 
-/// Why a peer is not admitted, or is disconnected.
+/// The reason why a peer is refused or disconnected.
 enum class RefusalCause : std::size_t {
-  kUnknownKey,      ///< its key is not listed
-  kRevokedKey,      ///< its key was removed from the list during the connection
-  kOtherRole,       ///< its key is for the other port
-  kWrongServerKey,  ///< it uses a public key that is not the server's
-  kOtherMechanism,  ///< it has no key but needs one, or has one and the server has none
+  kUnknownKey,      ///< the peer's key is not in the list of keys
+  kRevokedKey,      ///< the peer's key was removed from the list while it was connected
+  kOtherRole,       ///< the peer's key is for the other port
+  kWrongServerKey,  ///< the peer expects another public key of the server
+  kOtherMechanism,  ///< only one of peer and server has a key
   kBound,           ///< too many connections or handshakes
-  kTooSlow,         ///< it does not finish its handshake in time
-  kFaulty,          ///< it violates the protocol
+  kTooSlow,         ///< the peer does not finish its handshake in time
+  kFaulty,          ///< the peer violates the protocol
 };
 inline constexpr std::size_t kRefusalCauses = 8;
 
-/// Such as "unknown key", for logs, tables and labels.
+/// Returns a name such as "unknown key" for logs, tables and labels.
 inline std::string_view name_of(RefusalCause cause) {
   constexpr std::array<std::string_view, kRefusalCauses> kNames{
       "unknown key",      "revoked key",     "key of another role",
@@ -49,15 +49,15 @@ struct KeyIdentity {
 
 /// Outcome of sending a message to a peer.
 enum class Delivery {
-  kSent,  ///< it was sent or queued
-  kBusy,  ///< as kSent, but the peer should get no more work until it reads its output
+  kSent,  ///< the message was sent or queued
+  kBusy,  ///< like kSent, but the peer should get no more work until it reads its output
   kGone,  ///< the peer has disconnected
 };
 
 using AuthResult = std::variant<std::shared_ptr<const KeyIdentity>, Refusal>;
 
-/// Decides whether a key is admitted. Called on the event loop, only for a key that the peer has
-/// proved to hold.
+/// Decides whether a peer with this public key may connect. It is called on the event loop, after
+/// the peer has proved that it holds the secret key.
 using Authenticate = std::function<AuthResult(const protocol::CurveKey& public_key)>;
 
 /// Settings of a port with keys.

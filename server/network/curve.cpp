@@ -6,7 +6,7 @@
 namespace oblique::server {
 namespace {
 
-// Parts of HELLO after its name.
+// Offsets and sizes of the parts of HELLO, without the command's name.
 constexpr std::size_t kPaddingAt = 2;
 constexpr std::size_t kPeersKeyAt = 74;
 constexpr std::size_t kHelloCounterAt = 106;
@@ -18,7 +18,7 @@ constexpr std::size_t kCookieTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kCookieBytes = kRandomNonceBytes + kMacBytes + kCookieTextBytes;
 constexpr std::size_t kWelcomeTextBytes = kKeyBytes + kCookieBytes;
 
-// Parts of INITIATE after its name, and of the text in its box.
+// Offsets and sizes of the parts of INITIATE, without its name, and of the text in its box.
 constexpr std::size_t kInitiateBoxAt = kCookieBytes + kCounterBytes;
 constexpr std::size_t kVouchTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kVouchBytes = kRandomNonceBytes + kMacBytes + kVouchTextBytes;
@@ -79,7 +79,7 @@ CurveHandshake::Outcome CurveHandshake::take_hello(std::string_view hello) {
   return welcome(peers_key, hello_key);
 }
 
-/// The data of WELCOME: a new server key for this connection, and the cookie.
+/// Returns the data of WELCOME: a new public key of the server for this connection, and the cookie.
 std::string CurveHandshake::welcome(std::string_view peers_key,
                                     const Secret<kKeyBytes>& hello_key) {
   protocol::CurveKey own_public;
@@ -129,7 +129,7 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
     return foreign;
   }
   std::memcpy(key_.data(), text.data(), kKeyBytes);
-  // Comes before authentication, so that a forged INITIATE does not reveal which keys are listed.
+  // Checks this before the list of keys, so that a forged INITIATE does not reveal listed keys.
   if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, short_term_key,
                   own_short_term_secret)) {
     return Refusal{RefusalCause::kFaulty, "it does not hold the secret half of its key"};
@@ -143,7 +143,8 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
   return text.substr(kPropertiesAt);
 }
 
-/// Whether the vouch proves that the peer holds `client_key` in this handshake with this server.
+/// Returns whether the vouch proves that the peer holds the secret half of `client_key` in this
+/// handshake with this server.
 bool CurveHandshake::is_vouched(std::string_view vouch, const protocol::CurveKey& client_key,
                                 const std::uint8_t* short_term_key,
                                 const std::uint8_t* own_short_term_secret) const {
@@ -179,7 +180,7 @@ void CurveSession::seal(std::string_view body, std::string& out) {
   out += kMessageName;
   out += counter;
   const std::size_t mac_at = out.size();
-  out.append(kMacBytes + 1, '\0');  // flags: a single frame, not a command
+  out.append(kMacBytes + 1, '\0');  // the flags mean a single frame that is no command
   out += body;
   std::uint8_t* const mac = raw(out.data() + mac_at);
   crypto_box_detached_afternm(mac + kMacBytes, mac, mac + kMacBytes, body.size() + 1, nonce.data(),

@@ -15,16 +15,16 @@
 
 #include "server/network/authenticator.h"
 
-// The server's side of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium. Handles bytes of
-// commands and frames; has no socket.
+// The server's side of CurveZMQ (rfc.zeromq.org 26) with one peer, on libsodium. Works on the bytes
+// of commands and frames; has no socket.
 namespace oblique::server {
 
 inline constexpr std::size_t kKeyBytes = std::tuple_size_v<protocol::CurveKey>;
 inline constexpr std::size_t kMacBytes = crypto_box_MACBYTES;
-inline constexpr std::size_t kCounterBytes = 8;       ///< of a nonce with a counter
-inline constexpr std::size_t kRandomNonceBytes = 16;  ///< of a random nonce
+inline constexpr std::size_t kCounterBytes = 8;       ///< size of the counter in a nonce
+inline constexpr std::size_t kRandomNonceBytes = 16;  ///< size of the random part of a nonce
 
-// Bytes as the type that libsodium uses.
+// Return the bytes with the type that libsodium uses.
 inline const std::uint8_t* raw(std::string_view bytes) {
   return reinterpret_cast<const std::uint8_t*>(bytes.data());
 }
@@ -34,7 +34,7 @@ inline std::uint8_t* raw(char* bytes) {
 
 using CurveNonce = std::array<std::uint8_t, crypto_box_NONCEBYTES>;
 
-/// `prefix` and `rest` have 24 bytes together.
+/// `prefix` and `rest` must have 24 bytes together.
 inline CurveNonce curve_nonce(std::string_view prefix, std::string_view rest) {
   CurveNonce nonce;
   std::copy(rest.begin(), rest.end(), std::copy(prefix.begin(), prefix.end(), nonce.begin()));
@@ -75,22 +75,22 @@ class Secret {
   std::array<std::uint8_t, kBytes> bytes_{};
 };
 
-/// Encrypts and decrypts after the handshake. The counters of both directions only grow, so no
-/// message is accepted twice or out of order.
+/// Encrypts and decrypts messages after the handshake. The counters of both directions only
+/// increase, so no message is accepted twice or out of order.
 class CurveSession {
  public:
-  /// Bytes that MESSAGE adds to a frame's body: name, counter, MAC and flags.
+  /// Number of bytes that MESSAGE adds to a frame's body: name, counter, MAC and flags.
   static constexpr std::size_t kAddedBytes = 33;
 
   CurveSession(const Secret<kKeyBytes>& shared_key, std::uint64_t received_counter)
       : key_(shared_key), received_counter_(received_counter) {}
 
-  /// The data of READY with these properties. To be called once, before all other functions.
+  /// Returns the data of READY with these properties. Must be called before the other functions.
   std::string ready(std::string_view properties);
-  /// Appends a MESSAGE with that body to `out`.
+  /// Appends a MESSAGE with this body to `out`.
   void seal(std::string_view body, std::string& out);
-  /// Decrypts the body of a MESSAGE. Nothing unless it comes from this peer, is new, and has a
-  /// single frame.
+  /// Returns the decrypted body of a MESSAGE. Returns nothing unless the message comes from this
+  /// peer, is new, and has a single frame.
   std::optional<std::string> open(std::string_view message);
 
  private:
@@ -99,20 +99,20 @@ class CurveSession {
   std::uint64_t sent_counter_ = 0;
 };
 
-/// The server's side of one handshake: one HELLO, then one INITIATE. In between it stores only the
-/// key of its cookie, which contains all other state. So a command that was recorded on one
-/// connection is refused on another.
+/// The server's side of one handshake: the peer sends HELLO and then INITIATE. In between the
+/// server stores only the key of its cookie; the cookie contains all other state. So a command that
+/// was recorded on one connection is refused on another.
 class CurveHandshake {
  public:
-  /// `security` must outlive this.
+  /// `security` must outlive this object.
   explicit CurveHandshake(const PortSecurity& security) : security_(security) {}
 
-  /// The data of WELCOME after HELLO, the peer's properties after INITIATE, or the reason for a
-  /// refusal.
+  /// The data of WELCOME after HELLO, the peer's properties after INITIATE, or why it is refused.
   using Outcome = std::variant<std::string, Refusal>;
-  /// Handles a command: its name and data. Takes about 0.1 ms.
+  /// Handles a command with this name and data. Takes about 0.1 ms.
   Outcome take(std::string_view command, std::string_view data);
-  /// Whether the peer has proved to hold an admitted key. Call the functions below only then.
+  /// Returns whether the peer has proved that it holds an admitted key. The functions below need
+  /// it.
   bool is_done() const { return session_.has_value(); }
   const std::shared_ptr<const KeyIdentity>& identity() const { return identity_; }
   const protocol::CurveKey& key() const { return key_; }
@@ -137,9 +137,9 @@ class CurveHandshake {
   std::optional<CurveSession> session_;
 };
 
-/// The code in an ERROR command: "400" if the key is not admitted, "500" if the peer has a wrong
-/// server key or violates the protocol, "300" if it may try later. libzmq 4.3.4 reports only
-/// three-digit codes to programs.
+/// Returns the code for an ERROR command: "400" if the key is not admitted, "500" if the peer has a
+/// wrong server key or violates the protocol, "300" if it may try again later. libzmq 4.3.4 reports
+/// only three-digit codes to programs.
 std::string_view error_code(RefusalCause cause);
 
 }  // namespace oblique::server

@@ -22,27 +22,27 @@ namespace {
 
 static_assert(CurveSession::kAddedBytes == protocol::kSealBytes);
 
-/// Numbers below this one are ports.
+/// Epoll reports a number: below this value it is a port, from here on a peer.
 constexpr std::uint64_t kFirstPeer = 16;
 constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
 constexpr std::size_t kReadBytes = 64 * 1024;
 constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
 
-// Limits of handshakes with keys, of which a step costs as much as hundreds of messages.
+// Limits on handshakes with keys. A step of such a handshake costs as much as hundreds of messages.
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
 constexpr std::size_t kMaxPendingSteps = 64;
-/// Fractions of `handshake_ms` after which the oldest handshake, or one of the newest from one
-/// source, makes room for another. At half of the first value thousands of handshakes of a busy
-/// process fail.
+/// The oldest handshake may be ended after handshake_ms / kPartOfOldest, and a recent one from the
+/// same source after handshake_ms / kPartOfNewest, to make room for another. With kPartOfOldest =
+/// 20 thousands of handshakes of a busy process fail.
 constexpr std::int64_t kPartOfOldest = 10;
 constexpr std::int64_t kPartOfNewest = 100;
 
 constexpr const char* kLeavesTooMuchUnread = "it does not read its output";
 
 void set_option(int socket, int level, int option, int value) {
-  // Fails for a peer that has disconnected, which reading reports.
+  // This fails if the peer has disconnected, which the next read reports.
   static_cast<void>(setsockopt(socket, level, option, &value, sizeof value));
 }
 
@@ -71,17 +71,17 @@ class Network::Connection {
   const Zmtp& zmtp() const { return zmtp_; }
   int descriptor() const { return socket_.number(); }
   std::size_t unsent_bytes() const { return out_.size() - sent_; }
-  /// Whether output can be sent. If not, its input may still be read.
+  /// Returns whether output can be sent. If not, input may still be read.
   bool can_send() const { return can_send_; }
   bool has_pending_handshake() const {
     return zmtp_.pending_step() == Zmtp::PendingStep::kHandshake;
   }
-  /// Whether it has a message, or an encrypted frame that may contain one.
+  /// Returns whether it has a message, or an encrypted frame that may contain a message.
   bool has_input_to_take() const {
     return zmtp_.has_message() || zmtp_.pending_step() == Zmtp::PendingStep::kSealedFrame;
   }
 
-  /// Reads once; false if the connection has ended.
+  /// Reads once. Returns false if the connection has ended.
   bool read() {
     std::array<char, kReadBytes> bytes;
     const std::size_t most = zmtp_.is_open() ? bytes.size() : kReadInHandshake_bytes;
@@ -126,7 +126,7 @@ class Network::Connection {
   bool can_send_ = true;
   Zmtp zmtp_;
   std::string out_;
-  std::size_t sent_ = 0;  // bytes of `out_` that were sent
+  std::size_t sent_ = 0;  // number of sent bytes at the beginning of `out_`
 };
 
 void Network::Connection::send(std::string_view body) {
@@ -179,11 +179,11 @@ struct Network::Peer {
   Port port;
   std::int64_t since_ms;
   std::int64_t last_input_ms;
-  bool is_queued = false;  // is in its port's queue or in `pending_steps_`
+  bool is_queued = false;  // true if it is in its port's queue or in `pending_steps_`
   bool is_paused = false;
   bool is_in_handshake = true;
   std::uint32_t watched_events = 0;  // 0: not in the epoll set
-  std::size_t held_in_bytes = 0;     // as counted in the totals
+  std::size_t held_in_bytes = 0;     // value that is included in the totals
   std::size_t waiting_out_bytes = 0;
   std::shared_ptr<const KeyIdentity> key;
 };
@@ -261,8 +261,8 @@ bool Network::has_more() const {
 
 void Network::accept_all(Port port) {
   constexpr std::size_t kMaxAtATime = 64;
-  // Accepts no more than can be handled in one turn; a burst of connections, as after a restart,
-  // waits in the system.
+  // Accepts no more connections than can be handled in one turn. Others wait in the system, for
+  // example after a restart.
   const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMaxAtATime;
   std::size_t taken = 0;
   for (std::size_t i = 0;
@@ -294,9 +294,9 @@ void Network::accept_all(Port port) {
   }
 }
 
-/// True if the number of handshakes is at its limit and the oldest has not had its minimum time.
-/// Ending it would be no use: it would reconnect at once, and among many slow peers none would ever
-/// be admitted.
+/// Returns true if the number of handshakes is at its limit and the oldest has not had its minimum
+/// time. Ending that handshake would not help: its peer would reconnect at once, and among many
+/// slow peers none would ever be admitted.
 bool Network::must_newcomers_wait() const {
   return handshakes_.size() >= limits_.handshakes && !has_used(*handshakes_.begin(), kPartOfOldest);
 }
@@ -311,7 +311,7 @@ void Network::set_accepting(Port port, bool is_accepting) {
   epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
 }
 
-/// Ends a connection if one more would exceed a limit. False if the new one must be refused.
+/// Ends a connection if another would exceed a limit. Returns false if the new one must be refused.
 bool Network::make_room(Port port, const PeerAddress& address) {
   if (ports_[port].security && !make_room_at_source(address)) {
     return false;
@@ -322,10 +322,10 @@ bool Network::make_room(Port port, const PeerAddress& address) {
   return peers_.size() < limits_.connections || make_room_for_connection(port);
 }
 
-/// Applies the limit for one source address. A new connection does not wait in the system, where it
-/// would delay other sources. Ends the oldest handshake if it has had its minimum time, else one of
-/// the newest: so most handshakes of slow peers finish, and a fast peer is soon admitted among many
-/// that never finish.
+/// Applies the limit for one source address. Returns false if the new connection must be refused;
+/// if it waited, it would delay other sources. Ends the oldest handshake if it has had its minimum
+/// time, else a recent one. So most handshakes of slow peers finish, and a fast peer is soon
+/// admitted among many that never finish.
 bool Network::make_room_at_source(const PeerAddress& address) {
   constexpr std::size_t kPartForNewest = 8;
   const auto found = handshakes_of_.find(address.source);
@@ -345,8 +345,8 @@ bool Network::make_room_at_source(const PeerAddress& address) {
   return true;
 }
 
-/// Ends the oldest handshake. If there is none, ends the connection that was silent for longest, at
-/// a port without keys. False if no connection may be ended.
+/// Ends the oldest handshake. If there is none and the port has no keys, ends the connection that
+/// was silent for longest. Returns false if no connection may be ended.
 bool Network::make_room_for_connection(Port port) {
   if (end_oldest_handshake()) {
     return true;
@@ -403,7 +403,7 @@ void Network::serve(Number number, std::uint32_t events) {
   }
 }
 
-/// Runs a few pending steps, so that connected peers are served in between.
+/// Runs a few pending steps. The limit lets connected peers be served in between.
 void Network::run_handshakes() {
   for (std::size_t steps = 0; steps < kStepsATurn && !pending_steps_.empty();) {
     const Number number = pending_steps_.front();
@@ -422,8 +422,7 @@ void Network::run_handshakes() {
   }
 }
 
-/// Handles a finished handshake, and ends a connection with a fault. False if the connection was
-/// ended.
+/// Handles a finished handshake. Ends a connection that has a fault, and then returns false.
 bool Network::examine(Number number, Peer& peer) {
   const Zmtp& zmtp = peer.connection.zmtp();
   if (peer.is_in_handshake && zmtp.is_open()) {
@@ -449,9 +448,9 @@ void Network::handshake_ended(Number number, Peer& peer) {
   }
 }
 
-/// To be called after any change of a peer. Updates the totals, its place in a queue and the
-/// awaited events. Input of a peer with a waiting message is watched only after the system has
-/// reported some: most messages are taken before, which saves two system calls.
+/// Updates the totals, the peer's place in a queue and the awaited events. Must be called after any
+/// change of a peer. While a message of the peer waits, its input is watched only if the system
+/// reports more: most messages are taken before that, which saves two system calls.
 void Network::update(Number number, Peer& peer) {
   const Connection& connection = peer.connection;
   update_sums(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
@@ -473,8 +472,8 @@ void Network::update_sums(Peer& peer, std::size_t held_in_bytes, std::size_t wai
   peer.waiting_out_bytes = waiting_out_bytes;
 }
 
-/// Sets the events to watch. A peer without any is removed from the epoll set, which would report a
-/// closed connection again and again.
+/// Sets the events to watch. A peer without awaited events is removed from the epoll set, which
+/// would otherwise report a closed connection again and again.
 void Network::watch(Number number, Peer& peer, std::uint32_t events) {
   if (events == peer.watched_events) {
     return;
@@ -502,7 +501,8 @@ void Network::read_paused_again() {
 }
 
 bool Network::has_unread_input(const std::string& identity) const {
-  // A trace on a slow line takes longer to arrive than a worker may be silent.
+  // A trace on a slow line may take longer to arrive than a worker may be silent. So a message that
+  // is still arriving counts as unread input.
   constexpr std::int64_t kPauseInMessage_ms = 1000;
   const Peer* const peer = find(identity);
   return peer != nullptr &&
@@ -603,8 +603,8 @@ void Network::end(Number number, const std::string& reason, std::optional<Refusa
   peers_.erase(found);
 }
 
-/// A peer that finds another mechanism in the server's greeting disconnects without a message,
-/// often in the middle of its own greeting.
+/// Ends a peer that has disconnected. A peer that finds another mechanism in the server's greeting
+/// disconnects without a message, often in the middle of its own greeting.
 void Network::end_peer_that_left(Number number, const Peer& peer) {
   if (peer.connection.zmtp().is_greeting()) {
     end(number,

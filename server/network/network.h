@@ -22,31 +22,33 @@
 
 namespace oblique::server {
 
-/// Limits on memory and connections that peers can use; proto/protocol.md lists them.
+/// Limits on memory and connections that peers can use. proto/protocol.md lists them.
 struct NetworkLimits {
   std::size_t connections =
-      limits::kConnections;  ///< at all ports; fewer if the system allows only fewer
-  /// Total size of messages that are incomplete or not taken yet. One peer has at most one message.
+      limits::kConnections;  ///< maximum number at all ports; fewer if the system allows only fewer
+  /// Maximum total size of messages that are incomplete or not taken. A peer has at most one
+  /// message.
   std::size_t held_in_bytes = limits::kHeldInBytes;
-  /// Above this size of a port's messages its peers are not read while one of the messages waits.
-  /// So peers that send faster than results are stored wait, and keep their connections.
+  /// If the messages of a port have more bytes than this and one of them waits, the port's peers
+  /// are not read. So peers that send faster than results are stored must wait, but stay connected.
   std::size_t held_in_to_pause_bytes = limits::kHeldInToPauseBytes;
   /// A peer with more unsent output than this is busy.
   std::size_t busy_bytes = limits::kBusyBytes;
-  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;  ///< for unsent output of one peer
-  std::size_t all_waiting_out_bytes = limits::kAllWaitingOutBytes;  ///< for that of all peers
-  std::int64_t handshake_ms = 10'000;                               ///< longest handshake
-  /// A connection with input in this time is not ended to make room for a new one.
+  std::size_t waiting_out_bytes = limits::kWaitingOutBytes;  ///< maximum unsent output of one peer
+  /// the same limit for all peers together
+  std::size_t all_waiting_out_bytes = limits::kAllWaitingOutBytes;
+  std::int64_t handshake_ms = 10'000;  ///< maximum time of a handshake
+  /// A connection that had input within this time is not ended to make room for a new one.
   std::int64_t active_ms = 5000;
-  /// Number of handshakes at a time. At the limit the oldest is ended after a tenth of
+  /// Maximum number of simultaneous handshakes. At this limit the oldest is ended after a tenth of
   /// `handshake_ms`.
   std::size_t handshakes = limits::kHandshakes;
-  /// Number of these from one source address at a port with keys.
+  /// Maximum number of simultaneous handshakes from one source address, at a port with keys.
   std::size_t handshakes_of_source = limits::kHandshakesOfSource;
 };
 
 struct Incoming {
-  std::string identity;  ///< of the connection; never reused
+  std::string identity;  ///< identity of the connection; never reused
   std::string body;
   /// Name and role of the peer's key. Null at a port without keys.
   std::shared_ptr<const KeyIdentity> key = {};
@@ -54,8 +56,8 @@ struct Incoming {
 
 struct Disconnect {
   std::string identity;
-  std::string reason;  ///< why the server ended it; empty: the peer disconnected
-  /// set if the peer was not admitted, or its key was revoked
+  std::string reason;  ///< why the server ended the connection; empty if the peer did
+  /// has a value if the peer was not admitted, or if its key was revoked
   std::optional<RefusalCause> refused = {};
   std::string address = {};  ///< such as 10.0.0.3:4711; empty without a reason
 };
@@ -63,7 +65,7 @@ struct Disconnect {
 /// The server's ports and connections, with limits on everything that peers can make it store. A
 /// peer that sends faster than it is served is not read, so TCP slows it down. Peers of a port take
 /// turns, message by message; each turn also runs a few handshake steps. It has no thread and
-/// blocks only in `flush`. Times are milliseconds of a monotonic clock.
+/// blocks only in `flush`. All times are milliseconds of a monotonic clock.
 class Network {
  public:
   explicit Network(NetworkLimits limits);
@@ -72,50 +74,51 @@ class Network {
   Network& operator=(const Network&) = delete;
 
   using Port = std::size_t;
-  /// Opens a port and returns its number, counted from 0. With `security` peers need keys (CURVE);
-  /// without it all are admitted (NULL). Throws std::runtime_error if it cannot listen.
+  /// Opens a port and returns its number, counted from 0. With `security` peers need keys
+  /// (mechanism CURVE); without it all peers are admitted (mechanism NULL). Throws
+  /// std::runtime_error if it cannot listen.
   Port listen(const std::string& address, const std::string& port,
               const std::optional<PortSecurity>& security = std::nullopt);
   const std::string& endpoint(Port port) const { return ports_.at(port).listener->endpoint(); }
 
-  /// Readable when `collect` has work.
+  /// Becomes readable when `collect` has work.
   int descriptor() const { return epoll_.number(); }
   /// Accepts, reads, sends and ends connections as far as possible without blocking.
   void collect(std::int64_t now_ms);
-  /// Whether `collect` has more work although `descriptor` may not be readable.
+  /// Returns whether `collect` has more work, although `descriptor` may not be readable.
   bool has_more() const;
 
-  /// Whether the next message of that connection may be taken.
+  /// Returns whether the next message of this connection may be taken.
   using MayTake = std::function<bool(const std::string& identity)>;
   /// Takes the next message at a port, from the peer whose turn it is.
   std::optional<Incoming> next(Port port, const MayTake& may_take);
 
-  /// Sends a message; keeps what the system does not accept. A peer that leaves too much output
-  /// unread is disconnected.
+  /// Sends a message, and queues what the system does not accept. Disconnects a peer that leaves
+  /// too much output unread.
   Delivery send(const std::string& identity, std::string_view body);
-  /// Whether its unsent output exceeds `busy_bytes`.
+  /// Returns whether the peer's unsent output exceeds `busy_bytes`.
   bool is_busy(const std::string& identity) const;
   bool is_connected(const std::string& identity) const { return find(identity) != nullptr; }
-  /// Whether it has a message that was not taken or is incomplete.
+  /// Returns whether the peer has a message that was not taken or is incomplete.
   bool has_unread_input(const std::string& identity) const;
-  /// Sends unsent output for at most this time.
+  /// Sends unsent output, but stops after `longest`.
   void flush(std::chrono::milliseconds longest);
 
-  /// Authenticates all connected peers again. Ends connections whose keys are no longer admitted,
-  /// and drops their input.
+  /// Authenticates all connected peers again. Ends connections whose keys are not admitted any
+  /// more, and drops their input.
   void admission_changed();
 
-  /// Connections that ended since the last call.
+  /// Returns the connections that have ended since the last call.
   std::vector<Disconnect> take_disconnects() { return std::exchange(disconnects_, {}); }
   std::size_t connections() const { return peers_.size(); }
   std::size_t connections(Port port) const {
     return port < ports_.size() ? ports_[port].connections : 0;
   }
-  /// Memory of messages that are incomplete or not taken [bytes].
+  /// Returns the size of messages that are incomplete or not taken [bytes].
   std::size_t held_in_bytes() const { return held_in_bytes_; }
-  /// Unsent output of all peers [bytes].
+  /// Returns the size of unsent output of all peers [bytes].
   std::size_t waiting_out_bytes() const { return waiting_out_bytes_; }
-  /// Number of refused peers since the start, by cause.
+  /// Returns the number of refused peers since the start, by cause.
   const std::array<std::uint64_t, kRefusalCauses>& refusals() const { return refusals_; }
 
  private:
@@ -125,7 +128,7 @@ class Network {
     std::unique_ptr<PortSecurity> security;
     std::size_t connections = 0;
     std::deque<Number> queue{};     // peers with a message, in order of their turns
-    std::size_t held_in_bytes = 0;  // total of its peers
+    std::size_t held_in_bytes = 0;  // total size of its peers' messages
     std::vector<Number> paused{};   // peers that are not read while the port is full
     bool is_accepting = true;       // if false, new connections wait in the system
   };
@@ -165,8 +168,8 @@ class Network {
   std::vector<OpenPort> ports_;
   std::unordered_map<Number, std::unique_ptr<Peer>> peers_;
   Number last_number_;
-  std::deque<Number> pending_steps_;  // peers with a handshake step to run, in order of their turns
-  std::set<Number> handshakes_;       // peers with an unfinished handshake, the oldest first
+  std::deque<Number> pending_steps_;  // peers with a handshake step to run, in turn
+  std::set<Number> handshakes_;       // peers in a handshake, the oldest first
   std::map<std::string, std::set<Number>> handshakes_of_;
   std::size_t held_in_bytes_ = 0;
   std::int64_t now_ms_ = 0;  // time of the last `collect`

@@ -14,7 +14,8 @@ constexpr std::size_t kMechanismBytes = 20;
 constexpr std::size_t kAsServerAt = 32;
 constexpr unsigned char kMajorVersion = 3;
 constexpr std::size_t kLongestShortFrame = 255;
-/// A normal READY has about 50 bytes and an INITIATE 300, plus up to 255 for an identity.
+/// Maximum size of a command. READY has about 50 bytes; INITIATE 300, plus up to 255 for an
+/// identity.
 constexpr std::uint64_t kLongestCommand = 4096;
 constexpr const char* kCutOff = "its properties are cut off";
 
@@ -29,7 +30,7 @@ std::string header_of(std::size_t body_bytes, unsigned flags) {
   return static_cast<char>(flags | kFrameLong) + big_endian_of(body_bytes);
 }
 
-/// Properties that the server sends in READY.
+/// Returns the properties that the server sends in READY.
 std::string own_properties() {
   return "\x0bSocket-Type" + std::string("\0\0\0\x06", 4) + "ROUTER";
 }
@@ -149,7 +150,7 @@ void Zmtp::advance() {
   }
 }
 
-/// True if it is complete. A wrong byte is a fault at once.
+/// Reads the peer's greeting. Returns true if it is complete. A wrong byte causes a fault at once.
 bool Zmtp::take_greeting() {
   const std::string_view bytes = pending();
   const auto is_wrong = [&](std::size_t at, auto&& is_right) {
@@ -291,7 +292,7 @@ void Zmtp::take_command(std::string_view body) {
   }
 }
 
-/// Opens the connection; false if the properties are refused.
+/// Opens the connection. Returns false if it refuses the properties.
 bool Zmtp::take_properties(std::string_view properties) {
   std::string fault = validate_properties(properties);
   if (!fault.empty()) {

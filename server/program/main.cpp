@@ -1,4 +1,4 @@
-// oblique-server: command line, signals and exit codes around the event loop.
+// The program oblique-server: command line, signals and exit codes around the event loop.
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -42,7 +42,7 @@ using oblique::server::LoopSettings;
 using oblique::server::LoopState;
 
 constexpr const char* kProgram = "oblique-server";
-/// Longest time of the last commit on a slow disk.
+/// Maximum time of the last commit, which may take long on a slow disk.
 constexpr std::chrono::seconds kLongestEnd{60};
 
 struct Options {
@@ -55,17 +55,17 @@ struct Options {
   oblique::protocol::LogSettings log;
 };
 
-/// Raises the limit of descriptors, because each connection needs one and the default is low.
+/// Raises the limit on open descriptors, because each connection needs one and the default is low.
 void take_all_descriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
     limit.rlim_cur = limit.rlim_max;
-    // On failure fewer connections are possible.
+    // If this fails, fewer connections are possible.
     static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
   }
 }
 
-/// Why the text is not -1 or an open descriptor, or an empty text.
+/// Returns why the text is not allowed, or "". It must be -1 or an open descriptor.
 std::string descriptor_error(const std::string& text) {
   int fd = -1;
   const bool is_number = CLI::detail::lexical_cast(text, fd);
@@ -74,7 +74,7 @@ std::string descriptor_error(const std::string& text) {
              : "\"" + text + "\" is not an open file descriptor";
 }
 
-/// Writes the endpoints as one line of JSON to the descriptor of --ready-fd.
+/// Writes the endpoints as a line of JSON to the descriptor given by --ready-fd.
 void write_endpoints(int fd, const EventLoop& loop) {
   nlohmann::json endpoints{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
   if (!loop.http_url().empty()) {
@@ -108,7 +108,7 @@ void notify(Notifier& notifier, const LoopState& state, std::chrono::millisecond
 
 int run(LoopSettings settings, int ready_fd, pid_t parent) {
   Notifier notifier;
-  oblique::protocol::StopSignals stop;  // before any thread starts
+  oblique::protocol::StopSignals stop;  // must be created before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!oblique::protocol::stop_with_parent(parent)) {
     spdlog::warn("the parent process ended before this one started");
@@ -126,7 +126,7 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
     write_endpoints(ready_fd, loop);
   }
   if (!loop.page_url().empty() && ::isatty(STDERR_FILENO) == 1) {
-    // Not logged, because the URL lets its reader change studies.
+    // The URL is not logged, because whoever reads it can change studies.
     std::cerr << "The page of this server: " << loop.page_url() << "\n";
   }
   notifier.ready(fmt::format("clients at {}", loop.client_endpoint()));
@@ -135,9 +135,9 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
                                                     : oblique::protocol::kFailed;
 }
 
-/// The limits that users may set; server/study/limits.h has their defaults and all other limits.
+/// Adds options for the limits that users may set. server/study/limits.h has all limits.
 void add_limits(CLI::App& app, LoopSettings& loop) {
-  constexpr std::size_t kMax = 1'000'000;  // for counts
+  constexpr std::size_t kMax = 1'000'000;  // maximum of limits that are counts
   constexpr std::size_t kLongestMessage = oblique::protocol::kMaxFrameBytes;
   constexpr std::size_t kMaxBytes = std::size_t{1} << 40U;
   const auto add = [&app](const char* name, auto& value, auto least, auto largest,
@@ -207,8 +207,8 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
   add_limits(app, loop);
 }
 
-/// Completes the options. Returns the exit code if the server must not run: after printing an
-/// error, or for --print-config.
+/// Completes the options. Returns the exit code if the server must not run: after an error, which
+/// it prints, or for --print-config.
 std::optional<int> finish_options(const CLI::App& app, const Configuration& configuration,
                                   Options& options) {
   LoopSettings& loop = options.loop;

@@ -39,13 +39,12 @@ std::vector<Column> row_columns() {
   };
 }
 
-/// Whether the view `runs` shows the list in another form than the table `results`.
+/// Returns whether the view `runs` shows the list in another form than the table `results`.
 bool is_remade_by_view(const solver::ResultList& list) {
   return list.column == "phases" || list.column == "ft_peaks";
 }
 
-/// An SQL expression over the columns of `runs` for the list `part`, with all digits of its
-/// numbers.
+/// Returns SQL over the columns of `runs` for the list `part`, with all digits of its numbers.
 std::string list_sql(const solver::ListPart& part) {
   const std::string list = fmt::format("runs.{}", part.list->column);
   if (part.member.empty()) {
@@ -107,7 +106,7 @@ void add_outputs(std::vector<Column>& columns) {
                                        : field.sent_with != solver::SentWith::kWorker,
                        part != nullptr ? list_sql(*part) : std::string()});
   }
-  // Lists in another form than in `solve --json`.
+  // Adds the lists that `solve --json` prints in another form.
   for (const auto* list : solver::result_lists()) {
     if (solver::find_result_column(list->column) == nullptr) {
       columns.push_back({std::string(list->column), std::string(list->unit), "output", "",
@@ -116,10 +115,10 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-/// Whether a key may have more than one value over the points of a recipe: if only some blocks have
+/// Returns whether a key may have several values over the points of a recipe: only some blocks have
 /// it, or it has several values, an expression or a distribution.
 bool varies(const protocol::Recipe& recipe, std::string_view key) {
-  std::optional<std::string> first;  // the axis of the first block; empty: no axis
+  std::optional<std::string> first;  // the axis in the first block; empty if it has none
   for (const auto& block : recipe.blocks()) {
     const auto axis = std::ranges::find(block.axes(), key, &protocol::Axis::key);
     const bool has_axis = axis != block.axes().end();

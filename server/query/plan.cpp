@@ -42,11 +42,11 @@ struct Part {
 };
 using Parts = std::array<Part, 4>;
 
-/// An element expression, which is replaced by SQL over a column: peaks[0].fn_N, peaks[0],
-/// fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from 0, like `seq` in the
-/// views; -1 is the last one. A missing element is NULL.
+/// An expression for an element of a list, which is replaced by SQL over the list's column:
+/// peaks[0].fn_N, peaks[0], fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from
+/// 0, like `seq` in the views; -1 is the last element. A missing element is NULL.
 struct Element {
-  std::size_t tokens = 0;  ///< number of its tokens; 0: not an element expression
+  std::size_t tokens = 0;  ///< number of the expression's tokens; 0 if it is no such expression
   std::string column;
   std::string sql;
   std::string unit;
@@ -66,8 +66,9 @@ int index_in(std::string_view list, std::string_view brackets) {
   return index;
 }
 
-/// SQL for kind, start or end of phase `index`: compression comes first, kinds alternate, and each
-/// phase starts at the end of the previous one. Much faster than the list of the view.
+/// Returns SQL for the kind, start or end of phase `index`. Compression comes first, kinds
+/// alternate, and each phase starts at the end of the previous one. This is much faster than
+/// reading the list of the view.
 std::string phase_sql(int index, std::size_t member) {
   const std::string count = fmt::format("json_array_length({})", kStoredPhases);
   const std::string i = index < 0 ? fmt::format("({} - {})", count, -index) : std::to_string(index);
@@ -78,7 +79,7 @@ std::string phase_sql(int index, std::size_t member) {
   return fmt::format("CASE WHEN {0} BETWEEN 0 AND {1} - 1 THEN {2} END", i, count, value);
 }
 
-/// Casts to a real number, because JSON's whole numbers would be divided as integers.
+/// Casts to a real number, because SQL would divide JSON's whole numbers as integers.
 std::string as_real(const std::string& sql) {
   return fmt::format("CAST({} AS REAL)", sql);
 }
@@ -116,7 +117,7 @@ Element element_at(SqlTokens tokens) {
   if (tokens.size() < 2 || tokens[0].kind != SqlToken::Kind::kName) {
     return {};
   }
-  // After a space SQL takes brackets for an alias and would return the whole list.
+  // SQL reads "[0]" after a space as an alias and would return the whole list.
   const bool touches = tokens[0].text.end() == tokens[1].text.begin();
   if (tokens[1].text.front() == '[' && (touches || is_list_column(tokens[0].text))) {
     return indexed(tokens);
@@ -139,7 +140,7 @@ Element element_at(SqlTokens tokens) {
       4, "major_mode", fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-/// Whether SQLite 3.40 may not read the number as the nearest double.
+/// Returns whether SQLite 3.40 may read the number as a double that is not the nearest one.
 bool is_decimal(const SqlToken& token) {
   return token.kind == SqlToken::Kind::kLiteral && decimal_number(token.text) &&
          token.text.find_first_of(".eE") != std::string_view::npos;
@@ -181,8 +182,8 @@ SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
   return tokens.subspan(i + 2, end - i - 2);
 }
 
-/// Whether an aggregate function is called at token `i`. min and max with several arguments do not
-/// aggregate.
+/// Returns whether an aggregate function is called at token `i`. min and max with several arguments
+/// do not aggregate.
 bool is_aggregate(SqlTokens tokens, std::size_t i) {
   const SqlFunction* const function = function_at(tokens, i);
   const bool compares = function != nullptr && (function->name == "min" || function->name == "max");
@@ -190,8 +191,8 @@ bool is_aggregate(SqlTokens tokens, std::size_t i) {
          (!compares || sql_items(arguments_of(tokens, i)).size() == 1);
 }
 
-/// The index of the first token outside subqueries for which `is_it` is true; the number of tokens
-/// if there is none.
+/// Returns the index of the first token outside subqueries for which `is_it` is true, or the number
+/// of tokens if `is_it` is true for none.
 template <class Predicate>
 std::size_t find_outside_subqueries(SqlTokens tokens, const Predicate& is_it) {
   for (std::size_t i = 0; i < tokens.size(); ++i) {
@@ -224,8 +225,8 @@ Names aliases_of(SqlTokens tokens) {
   return aliases;
 }
 
-/// Throws InputError for a name that differs from a column only by case, because SQL ignores case.
-/// Names of functions, aliases and names in `free` are not checked.
+/// Throws InputError for a name that differs from a column only in case, because SQL ignores case.
+/// Does not check function names, aliases and names in `free`.
 void check_letter_case(const Part& part, const Names& free) {
   const auto tokens = sql_tokens(part.written);
   for (std::size_t i = 0; i < tokens.size(); ++i) {
@@ -246,9 +247,9 @@ void check_letter_case(const Part& part, const Names& free) {
   }
 }
 
-/// Throws InputError if an item of a grouped row contains no aggregate but a column that is not in
-/// --group: SQL would take its value from an arbitrary point. Also applies to the single row of an
-/// aggregate without groups.
+/// Throws InputError if a selected expression without an aggregate function names a column that is
+/// not in --group: SQL would take its value from an arbitrary point. This also applies to
+/// aggregates without --group.
 void check_grouped(const Part& select, const Part& group) {
   const auto selected = sql_tokens(select.written);
   if (has_window(selected) || (group.written.empty() && !has_aggregate(selected))) {
@@ -276,8 +277,8 @@ void check_grouped(const Part& select, const Part& group) {
   }
 }
 
-/// The unit of a column, an element, or a function that keeps the unit of its argument. Empty for
-/// pure numbers, texts and other expressions.
+/// Returns the unit of a column, an element, or a function that keeps the unit of its argument;
+/// empty for pure numbers, texts and other expressions.
 std::string unit_of(SqlTokens tokens) {
   if (tokens.size() > 2 && is_word(tokens[tokens.size() - 2], "as")) {
     tokens = tokens.first(tokens.size() - 2);
@@ -295,7 +296,7 @@ std::string unit_of(SqlTokens tokens) {
                                                : std::string();
 }
 
-/// The names of all columns: those of the view `runs` in its order, then the others.
+/// Returns the names of all columns: first those of the view `runs` in its order, then all others.
 std::vector<std::string> names_of_star(sqlite3* database) {
   std::vector<std::string> names;
   const StatementHandle view = prepare_query(database, "SELECT * FROM runs");
@@ -313,7 +314,7 @@ std::vector<std::string> names_of_star(sqlite3* database) {
   return names;
 }
 
-/// The selected columns, and the SQL expression for each. Expands `*` to all columns.
+/// Returns the selected columns, and an SQL expression for each. Expands `*` to all columns.
 std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns(sqlite3* database,
                                                                                  SqlTokens tokens,
                                                                                  Names& names) {
@@ -339,13 +340,13 @@ std::pair<std::vector<PlannedColumn>, std::vector<std::string>> selected_columns
 using Ranges = std::vector<PointRange>;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// More ranges than this are merged into one, because the statement would be long and slow to
-/// prepare.
+/// Maximum number of ranges. Longer lists are merged into one range, because preparing the
+/// statement would take long.
 constexpr std::size_t kMaxRanges = 20'000;
-/// Conditions nested more deeply are ignored.
+/// Maximum nesting of a condition. Deeper conditions do not restrict the ranges.
 constexpr int kDeepest = 50;
 
-/// The range from the first point of `ranges` to the last. `ranges` must not be empty.
+/// Returns the range from the first to the last point of `ranges`, which must not be empty.
 Ranges hull(const Ranges& ranges) {
   return {{ranges.front().first, ranges.back().last}};
 }
@@ -357,7 +358,7 @@ struct Interval {
 /// The allowed interval of each restricted column.
 using Intervals = std::map<std::string, Interval, std::less<>>;
 
-/// The number in `tokens`, with an optional sign; none if they are not a single number.
+/// Returns the number in `tokens`, which may have a sign; none if they are not a single number.
 std::optional<double> number_in(SqlTokens tokens) {
   const bool is_negative = !tokens.empty() && tokens[0].is_sign("-");
   if (is_negative || (!tokens.empty() && tokens[0].is_sign("+"))) {
@@ -376,8 +377,8 @@ void restrict_column(Intervals& intervals, SqlTokens column, std::optional<doubl
   }
 }
 
-/// Applies `column BETWEEN number AND number`, `column < number` and so on. Ignores other
-/// conditions.
+/// Narrows the interval of the column in conditions such as `column BETWEEN number AND number` or
+/// `column < number`. Ignores other conditions.
 void add_condition(Intervals& intervals, SqlTokens tokens) {
   if (tokens.size() > 2 && is_word(tokens[1], "between")) {
     const auto middle =
@@ -403,7 +404,7 @@ void add_condition(Intervals& intervals, SqlTokens tokens) {
   }
 }
 
-/// Splits `tokens` at AND into conditions; returns `tokens` as a whole if it cannot.
+/// Splits `tokens` at AND into conditions. Returns a single condition if it is not a conjunction.
 std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   const bool is_in_brackets =
       !tokens.empty() && tokens[0].is_sign("(") && closing_bracket(tokens, 0) == tokens.size() - 1;
@@ -435,7 +436,7 @@ std::vector<SqlTokens> conjuncts_of(SqlTokens tokens, int depth = 0) {
   return conjuncts;
 }
 
-/// Whether only failed points can meet the condition, because it requires `error IS NOT NULL`.
+/// Returns whether the condition requires `error IS NOT NULL`, so only failed points can meet it.
 bool requires_failure(std::string_view condition) {
   constexpr std::array<std::string_view, 4> kWords{"error", "is", "not", "null"};
   const auto tokens = sql_tokens(condition);
@@ -444,16 +445,18 @@ bool requires_failure(std::string_view condition) {
   });
 }
 
-/// The interval of an axis; nullptr if it is not restricted or its column depends on other axes.
+/// Returns the allowed interval of an axis; nullptr if it is not restricted or depends on other
+/// axes.
 const Interval* interval_of(const protocol::Axis& axis, const Intervals& intervals) {
   const auto found = intervals.find(column_of_key(axis.key()));
-  // Axes of single lengths change `length` too, and `integrator` is a text.
+  // Excludes lengths, because an axis of one link changes `length` too, and the text `integrator`.
   const bool is_own = protocol::has_own_values(axis) && !axis.key().starts_with("length") &&
                       axis.key() != "integrator";
   return found == intervals.end() || !is_own ? nullptr : &found->second;
 }
 
-/// Index of the first value of a range of at least `value`; the number of values if there is none.
+/// Returns the index of the first value of a range that is >= `value`; the number of values if all
+/// are smaller.
 std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
   std::uint64_t first = 0;
   for (std::uint64_t end = axis.count(); first < end;) {
@@ -467,8 +470,8 @@ std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
   return first;
 }
 
-/// Indices of the first and last value of an axis in `interval`, or none; for a range one value
-/// wider at each end.
+/// Returns the indices of an axis's first and last value in `interval`; none if no value is in it.
+/// For a range the result is one value wider at each end.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
   if (axis.count() > 0) {
     if (interval.low > interval.high) {
@@ -488,8 +491,8 @@ std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval&
   return found;
 }
 
-/// Ranges of a block's points, counted from 0. Builds those of a product from its fastest axis
-/// outwards.
+/// Returns the ranges of a block's points that may be in `intervals`, counted from 0. Loops over
+/// the axes from the last, which varies fastest, to the first.
 Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   const std::uint64_t points = protocol::points_of_block(block);
   if (points == 0) {
@@ -498,7 +501,7 @@ Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   if (block.has_sample() || block.zip()) {
     return {{0, points - 1}};
   }
-  Ranges ranges{{0, 0}};  // ranges over the axes from `a` on
+  Ranges ranges{{0, 0}};  // ranges over axis `a` and all later axes
   std::uint64_t stride = 1;
   for (int a = block.axes_size(); a-- > 0;) {
     const protocol::Axis& axis = block.axes(a);
@@ -531,7 +534,7 @@ struct QueriedStudy {
   std::string name;
   std::int64_t study_id = 0;
   std::uint64_t points = 0;
-  protocol::Recipe recipe{};  ///< without blocks if the stored bytes are invalid
+  protocol::Recipe recipe{};  ///< has no blocks if the stored bytes are invalid
 };
 
 QueriedStudy find_study(sqlite3* database, const std::string& name) {
@@ -547,15 +550,15 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   return found;
 }
 
-/// SQL for the rows of a study, of a set of points that contains all that meet a condition.
+/// SQL that selects rows of a study, among them all rows that meet a condition.
 struct Rows {
   std::string sql;
-  bool are_sorted = false;  ///< rows are in order of points without ORDER BY
+  bool are_sorted = false;  ///< true if rows come in order of points without ORDER BY
 };
 
-/// The rows with the columns in `names`. They come from the table `results` if it has all of these,
-/// because a lookup of model and worker for each row is slow. No condition of the user can reach
-/// another study.
+/// Returns SQL for the rows with the columns in `names`. Reads the table `results` if it has all
+/// these columns, because looking up model and worker for each row is slow. A user's condition
+/// cannot reach rows of other studies.
 Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& names) {
   std::string selected = "runs.point AS point";
   bool are_stored = true;
@@ -578,14 +581,14 @@ Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& n
   std::string join;
   std::string condition;
   if (study.recipe.blocks().empty() || points_in(ranges) == study.points) {
-    condition = "1";  // a range would keep SQLite from looking up points that the condition names
+    condition = "1";  // with a range SQLite would not look up the points that the condition names
   } else if (ranges.size() < 2) {
     condition = ranges.empty()
                     ? "0"
                     : fmt::format("runs.point BETWEEN {} AND {}", ranges[0].first, ranges[0].last);
   } else {
-    // SQLite reads a JSON list faster than it compiles VALUES. For a cross join it reads the ranges
-    // one after another, and the rows of each by their key.
+    // SQLite reads a JSON list faster than it compiles VALUES. CROSS JOIN makes it read the ranges
+    // one after another, and the rows of each range by their key.
     for (const PointRange& range : ranges) {
       join += fmt::format("{}\"{}\":{}", join.empty() ? "" : ",", range.first, range.last);
     }
@@ -611,7 +614,7 @@ std::string statement_of(std::span<const Part> parts, const std::string& rows) {
   return sql;
 }
 
-/// A hint for a column or function that SQLite did not find; empty for other messages.
+/// Returns a hint if SQLite's message is about an unknown column or function; else an empty text.
 std::string name_hint(const std::string& message) {
   const auto colon = message.rfind(": ");
   if (!message.starts_with("no such ") || colon == std::string::npos) {
@@ -626,9 +629,9 @@ std::string name_hint(const std::string& message) {
          "; `oblique columns` lists columns and functions; write texts in single quotes";
 }
 
-/// Throws InputError for a statement that SQLite refuses. Names the first clause with which SQLite
-/// refuses it, because SQLite's message about the whole statement may quote text that the user did
-/// not write.
+/// Throws InputError for a statement that SQLite refuses. Names the first clause that SQLite
+/// refuses, because SQLite's message about the whole statement may quote text that the user did not
+/// write.
 [[noreturn]] void refuse(sqlite3* database, const Parts& parts, const std::string& rows) {
   for (std::size_t count = 1; count <= parts.size(); ++count) {
     const Part& last = parts[count - 1];
@@ -642,8 +645,8 @@ std::string name_hint(const std::string& message) {
   throw InputError("the query is too long");
 }
 
-/// The clauses of `question`, with default columns if it selects none. Throws InputError, which
-/// names the flag.
+/// Returns the clauses of `question`; selects the default columns if `question` selects none.
+/// Throws InputError, which names the flag.
 Parts parts_of(const protocol::StudyQuery& question, const protocol::Recipe& recipe) {
   std::string select = fmt::format("{}", fmt::join(question.select(), ", "));
   if (select.empty()) {
@@ -714,7 +717,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   auto& [select, where, group, order] = parts;
   const auto tokens = sql_tokens(select.written);
   for (const Part& part : parts) {
-    // SQL resolves names in ORDER BY as aliases first.
+    // In ORDER BY, SQL first looks for an alias of that name.
     check_letter_case(part, &part == &order ? aliases_of(tokens) : Names());
   }
   check_grouped(select, group);
@@ -740,7 +743,8 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   } catch (const StatementError&) {
     refuse(database, parts, rows.sql);
   }
-  // SQLite names a column by its alias or else its text, which may have been replaced.
+  // SQLite names a column after its alias or its text, which may be a translation of the user's
+  // text.
   for (std::size_t i = 0; i < plan.columns.size(); ++i) {
     const char* name = sqlite3_column_name(plan.statement.get(), static_cast<int>(i));
     if (name != nullptr && name != columns_sql[i]) {

@@ -15,7 +15,7 @@ namespace oblique::server {
 /// One column of an answer.
 struct PlannedColumn {
   std::string name;
-  std::string unit;  ///< SI; empty: a number without unit, a text, or unknown
+  std::string unit;  ///< SI unit; empty: a number without unit, a text, or unknown
 };
 
 /// The statement for a query of a study.
@@ -26,11 +26,11 @@ struct Plan {
 };
 
 /// Turns `question` into a statement. `database` must have passed restrict_to_reading. Throws
-/// solver::InputError for a wrong query, with the flag or column and what is allowed; StorageError
-/// or QueryError if the database cannot be read.
+/// solver::InputError for a wrong query, with the flag or column and what is allowed. Throws
+/// StorageError or QueryError if the database cannot be read.
 Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
-/// The error message for an unknown study, with the nearest name.
+/// Returns the error message for an unknown study, with the nearest name.
 std::string no_such_study(sqlite3* database, const std::string& name);
 
 /// Consecutive points, both ends included.
@@ -41,11 +41,11 @@ struct PointRange {
   bool operator==(const PointRange&) const = default;
 };
 
-/// Disjoint ascending ranges that contain every point of `recipe` that meets `condition`, and
-/// possibly other points. Uses only comparisons of an axis of a product block with numbers (=, <,
-/// <=, >, >=, BETWEEN), joined by AND. A range is one axis value wider at each end, because another
-/// machine may round a value differently. `condition` must have passed check_sql_part; empty: all
-/// points.
+/// Returns disjoint ascending ranges that contain every point of `recipe` that meets `condition`,
+/// and possibly other points. Uses only comparisons of an axis of a product block with numbers (=,
+/// <, <=, >, >=, BETWEEN), joined by AND. A range is one axis value wider at each end, because
+/// another machine may round a value differently. `condition` must have passed check_sql_part;
+/// empty: all points.
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
 
 std::uint64_t points_in(const std::vector<PointRange>& ranges);

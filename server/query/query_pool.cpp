@@ -35,13 +35,13 @@ namespace {
 
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
-/// Marks a cancelled query, in place of a number of chunks.
+/// Value for a cancelled query, in place of its number of received chunks.
 constexpr std::uint64_t kCancelled = UINT64_MAX;
 
 // ---- The reader process -------------------------------------------------------------------------
 
-/// Size of the address space of this process [bytes]. Sanitizers reserve much more than the memory
-/// in use.
+/// Returns the size of this process's address space [bytes]. Sanitizers reserve much more than they
+/// use.
 rlim_t mapped_bytes() {
   std::ifstream sizes("/proc/self/statm");
   rlim_t pages = 0;
@@ -56,11 +56,11 @@ void limit(Resource resource, rlim_t most) {
 }
 
 void confine() {
-  constexpr std::int64_t kHeapBytes = 256 << 20U;  // for SQLite, which sorts and groups in memory
-  constexpr rlim_t kOwnBytes = 512U << 20U;        // for the answer
-  // for the log's index (-shm), which SQLite may create
+  constexpr std::int64_t kHeapBytes = 256 << 20U;  // SQLite sorts and groups in memory
+  constexpr rlim_t kOwnBytes = 512U << 20U;        // memory for the answer
+  // enough for the log's index (-shm), which SQLite may create
   constexpr rlim_t kLargestFile = 64U << 20U;
-  constexpr int kNiceness = 5;  // lower priority than server and workers
+  constexpr int kNiceness = 5;  // lower priority than the server and the workers
   check_call(prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, "prctl");
   // A write beyond the size limit returns an error instead of raising a signal.
   std::signal(SIGXFSZ, SIG_IGN);
@@ -68,13 +68,13 @@ void confine() {
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);
   sqlite3_hard_heap_limit64(kHeapBytes);
-  // If the next two calls fail, the reader runs without their effect. The kernel kills this process
-  // first when memory runs out.
+  // Errors of the next two calls are ignored, because the reader can run without them. The second
+  // one makes the kernel kill this process first when memory runs out.
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
   std::ofstream("/proc/self/oom_score_adj") << "1000";
 }
 
-/// Whether the server no longer reads the answer, for example because it was killed.
+/// Returns whether the server no longer reads the answer, for example because it was killed.
 bool server_is_gone() {
   pollfd answer{STDOUT_FILENO, 0, 0};
   return ::poll(&answer, 1, 0) > 0;
@@ -95,7 +95,7 @@ void send_frame(const std::string& reply, bool is_last) {
 void send_answer(const std::string& path, const protocol::QueryRequest& request) {
   Reader reader(path);
   QueryLimits limits;
-  limits.time_limit_ms = 0;  // the server enforces the deadline
+  limits.time_limit_ms = 0;  // the server enforces the time limit
   Answer answer = reader.answer(request, limits);
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();
@@ -119,7 +119,7 @@ std::string encoded_error(const std::string& message, bool wrong_request) {
   constexpr std::size_t kLongestError = 4000;
   protocol::ClientReply reply;
   reply.mutable_error()->set_wrong_request(wrong_request);
-  // SQLite's message may quote any bytes of the statement.
+  // SQLite's message may quote bytes of the statement that are not UTF-8.
   reply.mutable_error()->set_message(protocol::shortened(
       protocol::is_utf8(message) ? message : hexadecimal(message), kLongestError));
   return protocol::encode(reply);
@@ -129,7 +129,7 @@ int run_reader_program(const std::string& path) {
   try {
     protocol::silence_protobuf();
     confine();
-    // If the server was killed before `confine`, no signal follows.
+    // If the server ended before `confine`, the kernel sends no signal about that.
     if (server_is_gone()) {
       return 0;
     }
@@ -178,7 +178,7 @@ std::optional<QueryJob> QueryQueue::start_next() {
   QueryJob job = std::move(*next);
   waiting_.erase(next);
   running_.emplace(job.ticket, job.client);
-  // Moves this client's other queries behind those of all others.
+  // Moves this client's other queries behind the queries of all other clients.
   std::stable_partition(waiting_.begin(), waiting_.end(),
                         [&](const QueryJob& each) { return each.client != job.client; });
   return job;
@@ -251,7 +251,7 @@ struct QueryPool::Running {
     std::string reply;
     bool is_last;
   };
-  /// The next frame, if it is complete. The process blocks while its frames are not read.
+  /// Returns the next frame if it is complete. The process blocks while its frames are not read.
   std::optional<Frame> next_frame() {
     constexpr std::size_t kReadBytes = 64 * 1024;
     std::array<char, kReadBytes> bytes;
@@ -275,14 +275,14 @@ struct QueryPool::Running {
 
   std::uint64_t ticket;
   std::int64_t time_limit_ms;
-  std::int64_t deadline_ms = 0;       ///< for the next chunk, or for the client to read one
+  std::int64_t deadline_ms = 0;       ///< for the next chunk, or until the client receives one
   std::int64_t answer_ends_ms = 0;    ///< deadline for the whole answer
   std::uint64_t given = 0;            ///< number of reported chunks
   std::uint64_t received_chunks = 0;  ///< number of chunks that the client has received
   pid_t pid = -1;
   protocol::Descriptor answer;
   std::string received;    ///< bytes of incomplete frames
-  bool is_broken = false;  ///< the process has ended or sent too long a frame
+  bool is_broken = false;  ///< true if the process has ended or sent a frame that is too long
 };
 
 QueryPool::QueryPool(std::string database, QueryPoolSettings settings, Report report)
@@ -340,7 +340,7 @@ void QueryPool::run() {
       }
       wait();
     } catch (const std::exception&) {
-      // For example std::bad_alloc; the next turn continues.
+      // An exception such as std::bad_alloc does not end the pool; the next turn tries again.
       std::this_thread::sleep_for(kRetryPause);
     }
   }
@@ -405,8 +405,8 @@ bool QueryPool::start_next() {
   return true;
 }
 
-/// Reports received frames, up to kChunksAhead more than the client has received. False if the
-/// query has ended.
+/// Reports received frames, up to kChunksAhead more than the client has received. Returns false if
+/// the query has ended.
 bool QueryPool::goes_on(Running& query) {
   while (!query.waits_for_client()) {
     auto frame = query.next_frame();

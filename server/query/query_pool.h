@@ -23,16 +23,16 @@ namespace oblique::server {
 /// A query of a client.
 struct QueryJob {
   std::uint64_t ticket;  ///< unique
-  std::string client;    ///< its key, or else its connection; clients take turns
+  std::string client;    ///< name of the client's key, or its connection without keys
   protocol::QueryRequest request;
 };
 
 struct QueueSettings {
-  std::size_t readers = limits::kRunningQueries;  ///< number that run at the same time
-  std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< of these, of one client
-  std::size_t most_waiting = limits::kWaitingQueries;               ///< number that wait
-  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< of one client
-  /// total size of waiting statements
+  std::size_t readers = limits::kRunningQueries;  ///< maximum number of running queries
+  std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< maximum number per client
+  std::size_t most_waiting = limits::kWaitingQueries;  ///< maximum number of waiting queries
+  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< maximum number per client
+  /// maximum total size of waiting statements [bytes]
   std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;
 };
 
@@ -41,7 +41,7 @@ class QueryQueue {
  public:
   explicit QueryQueue(QueueSettings settings) : settings_(settings) {}
 
-  /// False if too many queries wait; the job is then dropped.
+  /// Returns false and drops the job if too many queries wait.
   bool add(QueryJob job);
   /// Returns the next query that may run; it counts as running until `remove`.
   std::optional<QueryJob> start_next();
@@ -53,7 +53,7 @@ class QueryQueue {
 
   QueueSettings settings_;
   std::deque<QueryJob> waiting_;  // jobs of the client whose turn is next come first
-  Running running_;               // clients, by ticket
+  Running running_;               // clients of running queries, by ticket
 };
 
 /// Progress of a query. kBegun: it has started to run. kRows: `reply` is a chunk of the answer.
@@ -66,12 +66,12 @@ struct QueryReport {
 };
 
 struct QueryPoolSettings {
-  /// Program of the reader processes (run_reader_program); default: this program.
+  /// Program of the reader processes (run_reader_program). The default is this program.
   std::string reader_program = "/proc/self/exe";
   QueueSettings queue;
   /// A client that receives none of kChunksAhead chunks within this time loses its answer.
   std::int64_t patience_ms = 10'000;
-  /// Longest time for a whole answer, including waiting for the client.
+  /// Maximum time for a whole answer, including the time that the client takes.
   std::int64_t longest_answer_ms = 1'800'000;
   std::function<std::int64_t()> now_ms = [] {
     return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
@@ -93,11 +93,11 @@ class QueryPool {
   QueryPool(const QueryPool&) = delete;
   QueryPool& operator=(const QueryPool&) = delete;
 
-  /// False if too many queries wait (QueueSettings).
+  /// Returns false if too many queries wait (QueueSettings).
   bool submit(QueryJob job);
-  /// The client has received the first `received` chunks of its answer.
+  /// Reports that the client has received the first `received` chunks of its answer.
   void more(std::uint64_t ticket, std::uint64_t received);
-  /// Ends a query or removes it from the queue. Reports about it may still arrive.
+  /// Ends a query or removes it from the queue. Its reports may still arrive.
   void cancel(std::uint64_t ticket);
   /// Kills all processes and ends the thread. Open queries get no answer.
   void stop();
@@ -119,17 +119,19 @@ class QueryPool {
   const Report report_;
   const protocol::WakeUp woken_;
   std::mutex mutex_;
-  QueryQueue queue_;                                        // guarded by mutex_
-  std::map<std::uint64_t, std::uint64_t> received_chunks_;  // guarded by mutex_; chunks, by ticket
-  bool stopping_ = false;                                   // guarded by mutex_
-  std::list<Running> running_;                              // used by the thread only
-  std::thread thread_;                                      // last: it uses the other members
+  QueryQueue queue_;  // guarded by mutex_
+  // guarded by mutex_; number of chunks by ticket
+  std::map<std::uint64_t, std::uint64_t> received_chunks_;
+  bool stopping_ = false;       // guarded by mutex_
+  std::list<Running> running_;  // used only by the pool's thread
+  // declared last, because it uses the other members
+  std::thread thread_;
 };
 
-/// Argument that turns oblique-server into a reader process: `oblique-server --read FILE`.
+/// Argument with which oblique-server runs as a reader process: `oblique-server --read FILE`.
 inline constexpr const char* kReadMode = "--read";
 
-/// Descriptor of a reader process from which it reads its query, an encoded QueryRequest.
+/// File descriptor from which a reader process reads its query, an encoded QueryRequest.
 inline constexpr int kReaderRequest = 3;
 
 /// Header of each frame on the standard output of a reader process. The frames of an answer are
@@ -139,14 +141,15 @@ struct FrameHead {
   std::uint32_t is_last;  ///< 1 in the last frame
 };
 
-/// Throws std::system_error with errno unless `done`.
+/// Throws std::system_error with errno if `done` is false.
 void check_call(bool done, const char* what);
 
 std::string encoded_error(const std::string& message, bool wrong_request = false);
 
-/// Starts `program` as a reader process for the database at `path`, with `request` as
-/// kReaderRequest and `answer` as standard output. No signal is blocked or ignored in it. It has a
-/// process group of its own, so Ctrl-C on the terminal does not reach it. Throws std::system_error.
+/// Starts `program` as a reader process for the database at `path`. Its descriptor kReaderRequest
+/// becomes `request` and its standard output `answer`. No signal is blocked or ignored in it. It
+/// has its own process group, so Ctrl-C on the terminal does not reach it. Throws
+/// std::system_error.
 pid_t start_reader(const std::string& program, const std::string& path, int request, int answer);
 
 /// Main function of a reader process: limits its own memory and files, and answers one query on the

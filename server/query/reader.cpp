@@ -19,8 +19,8 @@ namespace {
 
 constexpr const char* kOnlyReads = "only reading is allowed";
 
-/// False for functions that reach outside the database, use addresses of this process, run SQL, or
-/// belong to virtual tables that our databases do not have.
+/// Returns false for functions that reach outside the database, use addresses of this process, run
+/// SQL, or belong to virtual tables that our databases do not have.
 bool is_harmless_function(std::string_view name) {
   constexpr std::array<std::string_view, 16> kOthers{
       "load_extension", "fts3_tokenizer", "fts5",       "fts5_source_id",
@@ -98,7 +98,7 @@ std::string took_too_long(std::int64_t time_limit_ms) {
 
 void restrict_to_reading(sqlite3* database) {
   execute(database, "PRAGMA temp_store = MEMORY; PRAGMA case_sensitive_like = ON");
-  // Leave the schema trusted: SQLite 3.40 treats json_extract, which our views use, as unsafe.
+  // The schema stays trusted, because SQLite 3.40 treats json_extract in our views as unsafe.
   constexpr std::array<std::pair<int, int>, 5> kSwitches{
       {{SQLITE_DBCONFIG_DEFENSIVE, 1},
        {SQLITE_DBCONFIG_DQS_DML, 0},
@@ -108,7 +108,8 @@ void restrict_to_reading(sqlite3* database) {
   for (const auto& [name, value] : kSwitches) {
     sqlite3_db_config(database, name, value, nullptr);
   }
-  // SQLite creates these virtual tables at their first use, which the authorizer would refuse.
+  // Uses these virtual tables once, because SQLite creates them at their first use and the
+  // authorizer would refuse that.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
   add_functions(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
@@ -294,7 +295,7 @@ Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& 
 
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
   time_.end_ms = INT64_MAX;
-  // Counts come from `completed_ranges` and indices if possible, which avoids reading rows.
+  // Counts come from `completed_ranges` and indices where possible, so that few rows are read.
   Statement list(database_.get(),
                  "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
                  " CASE s.counted WHEN 1 THEN (SELECT coalesce(sum(c.points), 0) FROM"
@@ -319,7 +320,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     const std::uint64_t completed = list.number(5);
     status.set_study_id(list.number(0));
     status.set_name(list.text(1));
-    // A server that was killed may not have stored the state "done".
+    // A killed server may not have stored the state "done".
     status.set_state(completed == list.number(3) ? "done" : list.text(2));
     status.set_points(list.number(3));
     status.set_created_at(list.text(4));

@@ -33,27 +33,27 @@ class StatementError : public QueryError {
 struct QueryLimits {
   /// maximum size of a row; below protocol::kMaxFrameBytes
   std::uint64_t max_row_bytes = 12ULL << 20U;
-  std::int64_t time_limit_ms = 30'000;  ///< for each chunk of the answer; 0: no limit
+  std::int64_t time_limit_ms = 30'000;  ///< time limit for each chunk of the answer; 0: no limit
   /// Maximum size of one text, blob or row inside the statement; at most SQLite's limit of 10^9.
   std::int64_t max_value_bytes = std::int64_t{16} << 20U;
-  /// A chunk ends with the first row after this time, so that the first rows of a slow statement
-  /// arrive early.
+  /// A chunk ends with the first row after this time, so that a slow statement's first rows come
+  /// early.
   std::int64_t longest_chunk_ms = 250;
 };
 
-/// No limits but SQLite's own, for statements of trusted programs.
+/// Only SQLite's own limits, for statements of trusted programs.
 inline constexpr QueryLimits kNoLimits{UINT64_MAX, 0, 1'000'000'000};
 
-/// Longest time limit that a client can request.
+/// Maximum time limit that a client can request.
 inline constexpr std::int64_t kLongestTimeLimit_ms = 600'000;
 
-/// Time limit of a request for each chunk of its answer.
+/// Returns the time limit of a request for each chunk of its answer.
 std::int64_t time_limit_of(const protocol::QueryRequest& request);
 
-/// The error message of a query that took longer than `time_limit_ms`.
+/// Returns the error message for a query that took longer than `time_limit_ms`.
 std::string took_too_long(std::int64_t time_limit_ms);
 
-inline constexpr int kLongestSql = 1'000'000;  ///< longest statement [bytes]
+inline constexpr int kLongestSql = 1'000'000;  ///< maximum size of a statement [bytes]
 
 /// Restricts statements on `database` to reading and to computing in memory, limits their size, and
 /// adds our functions. Makes LIKE case-sensitive, because in a mode S means stick and s slip.
@@ -61,21 +61,21 @@ void restrict_to_reading(sqlite3* database);
 
 using StatementHandle = std::unique_ptr<sqlite3_stmt, int (*)(sqlite3_stmt*)>;
 
-/// Prepares one read-only statement. Throws StatementError for none or several statements, for a
-/// statement that writes, attaches, changes settings or has parameters, and for one that SQLite
-/// refuses. Throws QueryError for one that needs too much memory.
+/// Prepares one read-only statement. Throws StatementError if `sql` has no or several statements,
+/// or if the statement writes, attaches, changes settings, has parameters, or is refused by SQLite.
+/// Throws QueryError if the statement needs too much memory.
 StatementHandle prepare_query(sqlite3* database, const std::string& sql);
 
-/// The error for a client after SQLite returned `code`.
+/// Returns the error to report to a client after SQLite returned `code`.
 QueryError failure(sqlite3* database, int code);
 
 /// Size at which a chunk of an answer ends [bytes].
 inline constexpr std::uint64_t kChunkBytes = std::uint64_t{256} << 10U;
 
-/// End of a statement, which SQLite checks while it runs.
+/// Time limit of a statement, which SQLite checks while the statement runs.
 struct TimeLimit {
   std::atomic<bool> is_interrupted = false;
-  std::int64_t end_ms = INT64_MAX;  ///< on the steady clock
+  std::int64_t end_ms = INT64_MAX;  ///< end of the limit on the steady clock
 };
 
 /// The rows of one statement in chunks. Holds a read transaction until it ends or is destroyed;
@@ -85,10 +85,10 @@ class Answer {
   Answer(sqlite3* database, const protocol::QueryRequest& request, const QueryLimits& limits,
          TimeLimit& time);
 
-  /// The next chunk, numbered from 1. The last one has `ends` set and may have no rows. A blob or a
-  /// text that is not UTF-8 becomes the text x'0F..'. Throws QueryError if the statement fails,
-  /// exceeds the time limit in this call, or has a row longer than `max_row_bytes`. Must not be
-  /// called after the end or a failure.
+  /// Returns the next chunk, numbered from 1. The last chunk has `ends` set and may have no rows. A
+  /// blob or a text that is not UTF-8 becomes the text x'0F..'. Throws QueryError if the statement
+  /// fails, exceeds the time limit in this call, or has a row longer than `max_row_bytes`. Must not
+  /// be called after the end or a failure.
   protocol::QueryReply next();
 
  private:
@@ -99,30 +99,28 @@ class Answer {
   sqlite3* database_;
   QueryLimits limits_;
   TimeLimit& time_;
-  std::int64_t start_ms_ = 0;  // start of the call of `next`
+  std::int64_t start_ms_ = 0;  // time at which `next` was called
   StatementHandle statement_{nullptr, &sqlite3_finalize};
   std::vector<std::string> units_;             // units of the columns; may be empty
-  std::optional<protocol::ChunkWriter> rows_;  // set by the constructor
+  std::optional<protocol::ChunkWriter> rows_;  // always set after construction
   std::uint64_t chunks_ = 0;
 };
 
-/// A database opened for reading only, which a server may write. Not thread-safe except
-/// `interrupt`.
+/// A database opened for reading only, while a server may write. Only `interrupt` is thread-safe.
 class Reader {
  public:
-  /// Throws StorageError with the reason: no file, a directory, a foreign file, another schema, an
-  /// unreadable file.
+  /// Throws StorageError if the file is missing, unreadable, foreign or of another schema.
   explicit Reader(const std::string& path);
 
-  /// Starts the answer to `request`. Throws as `prepare_query` and `plan` do. The reader must
-  /// outlive the answer and must not be used until it ends.
+  /// Starts the answer to `request`. Throws the errors of `prepare_query` and `plan`. The reader
+  /// must outlive the answer and must not be used until the answer ends.
   Answer answer(const protocol::QueryRequest& request, const QueryLimits& limits);
 
-  /// The whole answer to one statement. Throws as Answer does.
+  /// Returns the whole answer to one statement. Throws the errors of Answer.
   protocol::Table query(const std::string& sql, const QueryLimits& limits);
 
-  /// Status of the study called `name`, or of all if `name` is empty. Leases and rate are 0,
-  /// because only a server has them. Throws QueryError for an unknown name.
+  /// Returns the status of the study called `name`, or of all studies if `name` is empty. Leases
+  /// and rate are 0, because only a server has them. Throws QueryError for an unknown name.
   std::vector<protocol::StudyStatus> study_status(const std::string& name = {});
 
   /// Ends the running query and all later ones. Thread-safe.

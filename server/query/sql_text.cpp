@@ -34,8 +34,8 @@ bool continues_name(char c) {
   return begins_name(c) || is_digit(c) || c == '$';
 }
 
-/// Throws for comments, parameters and anything else that would end or change the statement around
-/// a text.
+/// Throws if `rest` begins with a comment, a parameter or anything else that would end or change
+/// the statement around the user's text.
 void check_beginning(std::string_view rest) {
   constexpr std::string_view kParameters = "?:@$#";
   if (rest.starts_with("--") || rest.starts_with("/*")) {
@@ -47,7 +47,7 @@ void check_beginning(std::string_view rest) {
   if (rest.front() == ';') {
     throw InputError("it has a semicolon");
   }
-  if (rest.starts_with("\xEF\xBB\xBF")) {  // which SQLite would treat as a space
+  if (rest.starts_with("\xEF\xBB\xBF")) {  // SQLite would treat it as a space
     throw InputError("it has a byte-order mark");
   }
   if (rest.front() == '\0') {
@@ -55,8 +55,8 @@ void check_beginning(std::string_view rest) {
   }
 }
 
-/// Length of a quoted text at the start of `rest`, whose quote opens at `open`. A doubled quote
-/// inside stands for one.
+/// Returns the length of a quoted text at the start of `rest`, whose quote opens at `open`. Inside,
+/// two quotes in a row stand for one quote.
 std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   std::size_t end = open;
   do {
@@ -69,8 +69,8 @@ std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   return end;
 }
 
-/// Length of a number: 1, 1.5, .5, 1e-5, 0x1F. Includes letters directly after it, so that SQLite
-/// refuses them.
+/// Returns the length of a number: 1, 1.5, .5, 1e-5, 0x1F. Counts letters directly after the number
+/// too, so that SQLite refuses them.
 std::size_t number_length(std::string_view rest) {
   std::size_t end = 0;
   while (end < rest.size() && (continues_name(rest[end]) || rest[end] == '.')) {
@@ -151,9 +151,9 @@ struct Moments {
   double products;
 };
 
-/// The object that SQLite keeps for the group, initially zeros. nullptr if memory runs out, which
-/// ends the statement. With `bytes` 0 the object is not created, and nullptr means a group without
-/// rows.
+/// Returns the object that SQLite keeps for the group, initially zeros. Returns nullptr if memory
+/// runs out, which ends the statement. With `bytes` 0 no object is created, and nullptr means a
+/// group without rows.
 template <class T>
 T* state_of(sqlite3_context* context,
             int bytes = sizeof(T)) {  // NOLINT(bugprone-sizeof-expression): T may be a pointer
@@ -164,7 +164,7 @@ T* state_of(sqlite3_context* context,
   return state;
 }
 
-/// Whether the value is a number. NULL is not; other values end the statement.
+/// Returns whether the value is a number. Returns false for NULL; other values end the statement.
 bool is_number(sqlite3_context* context, sqlite3_value* value) {
   const int type = sqlite3_value_type(value);
   if (type == SQLITE_TEXT || type == SQLITE_BLOB) {
@@ -173,7 +173,7 @@ bool is_number(sqlite3_context* context, sqlite3_value* value) {
   return type == SQLITE_INTEGER || type == SQLITE_FLOAT;
 }
 
-/// The numbers of a group, to which SQLite keeps a pointer.
+/// The numbers of a group. SQLite keeps a pointer to them.
 using Numbers = std::vector<double>;
 
 void median_step(sqlite3_context* context, int, sqlite3_value** arguments) {
@@ -189,7 +189,7 @@ void median_step(sqlite3_context* context, int, sqlite3_value** arguments) {
   }
 }
 
-/// Returns the median. SQLite also calls this if the statement fails.
+/// Returns the median. SQLite also calls this function when the statement has failed.
 void median_final(sqlite3_context* context) {
   auto** const state = state_of<Numbers*>(context, 0);
   const std::unique_ptr<Numbers> numbers(state == nullptr ? nullptr : *state);
@@ -335,7 +335,7 @@ std::string sql_text(std::string_view text) {
 
 std::string not_allowed(std::string_view flag, std::string_view text, std::string_view why) {
   constexpr std::size_t kLongest = 200;
-  // Messages of exceptions end at a zero byte.
+  // The message of an exception ends at its first zero byte.
   const std::string printable(text.substr(0, text.find('\0')));
   const std::string shown = protocol::shortened(printable, kLongest);
   return fmt::format("{} \"{}{}\" is not allowed: {}", flag, shown,

@@ -22,51 +22,53 @@ struct SqlToken {
 };
 using SqlTokens = std::span<const SqlToken>;
 
-/// Splits `text` into tokens as SQLite does; a comparison such as <= is one token, other signs are
-/// one character. Throws solver::InputError, whose message is a clause, for a comment, a parameter,
-/// a semicolon, a zero byte, a byte-order mark, or an unclosed quote. The tokens refer to `text`.
+/// Splits `text` into tokens as SQLite does. A comparison such as <= is one token; each other sign
+/// is a token of its own. Throws solver::InputError, whose message is a clause, for a comment, a
+/// parameter, a semicolon, a zero byte, a byte-order mark, or an unclosed quote. The tokens refer
+/// to `text`.
 std::vector<SqlToken> sql_tokens(std::string_view text);
 
-/// Whether a token is the keyword or function `word`, ignoring case.
+/// Returns whether a token is the keyword or function `word`, ignoring case.
 bool is_word(const SqlToken& token, std::string_view word);
 
-/// Index of the bracket that closes the one at `open`; the number of tokens if there is none.
+/// Returns the index of the bracket that closes the one at `open`; the number of tokens if none
+/// does.
 std::size_t closing_bracket(SqlTokens tokens, std::size_t open);
 
-/// The name in a token, without its quotes.
+/// Returns the name in a token, without its quotes.
 std::string name_of(const SqlToken& token);
 
-/// The items of a list, separated by commas outside brackets.
+/// Returns the items of a list that is separated by commas outside brackets.
 std::vector<SqlTokens> sql_items(SqlTokens tokens);
 
-/// The text from the first to the last of `tokens`.
+/// Returns the text from the first to the last of `tokens`.
 std::string_view text_over(SqlTokens tokens);
 
 /// Formats a text as an SQL literal in single quotes.
 std::string sql_text(std::string_view text);
 
-/// "FLAG "TEXT" is not allowed: WHY"; a long text is shortened.
+/// Returns `FLAG "TEXT" is not allowed: WHY`; a long text is shortened.
 std::string not_allowed(std::string_view flag, std::string_view text, std::string_view why);
 
 /// Throws solver::InputError with `flag` and the text if `text` could change the statement around
-/// it. Allowed are closed brackets and quotes; not allowed are comments, parameters, semicolons,
-/// and clauses outside brackets. SQLite checks the rest.
+/// it. Brackets and quotes must be closed. Comments, parameters, semicolons, and clauses outside
+/// brackets are not allowed. SQLite checks the rest.
 void check_sql_part(std::string_view flag, std::string_view text);
 
 /// SQL function that returns the double nearest to the decimal in a text.
 inline constexpr std::string_view kNumberFunction = "nearest_double";
 
-/// The double nearest to a decimal such as .5 or 1e-3; none for other texts.
+/// Returns the double nearest to a decimal such as .5 or 1e-3; none for other texts.
 std::optional<double> decimal_number(std::string_view text);
 
-/// A function that queries may use, ours or SQLite's.
+/// A function that queries may use: one of ours, or SQLite's.
 struct SqlFunction {
   std::string_view name;
-  std::string_view form;     ///< for listings; empty: not listed
+  std::string_view form;     ///< the call as shown in listings; empty: not listed
   std::string_view meaning;  ///< one line
-  /// gives one value from many rows; for min and max only with one argument
+  /// true for an aggregate function; min and max aggregate only with one argument
   bool aggregates = false;
-  bool keeps_unit = false;  ///< its value has the unit of its first argument
+  bool keeps_unit = false;  ///< true if the result has the unit of the first argument
 };
 std::span<const SqlFunction> sql_functions();
 

@@ -17,38 +17,38 @@ using WorkerId = std::uint64_t;
 /// Number of a worker process, unique while the scheduler runs.
 using ProcessNumber = std::uint64_t;
 
-/// No process: such a loss cannot be taken back.
+/// Stands for no process. A loss of kNoProcess is never removed from a history.
 constexpr ProcessNumber kNoProcess = 0;
 
-/// A lease that ended without an answer to its points.
+/// A lease that ended before all its points were answered.
 struct Loss {
-  /// process that was lost; kNoProcess if the worker ended the lease and is still connected
+  /// the lost process; kNoProcess if the worker ended the lease and is still connected
   ProcessNumber process;
-  /// The process had solved points before, and held only this point.
+  /// true if the process had solved points before and held only this point
   bool alone;
 
   bool operator==(const Loss&) const = default;
 };
 
-/// Suspicion against points after losses. Each level includes the conditions of the lower ones.
+/// How suspect a point is after losses. Each level includes the conditions of the lower levels.
 enum class Suspicion : std::uint8_t {
-  kSound,    ///< leased with others, in batches of any size
-  kSuspect,  ///< part of several losses: leased to a worker that holds nothing else
-  kRisky,    ///< a single point that a worker held alone when it was lost
-  kFailing   ///< lost so many workers alone that it fails, unless one of them returns
+  kSound,    ///< may be in a batch of any size with other points
+  kSuspect,  ///< had several losses; is leased to a worker that holds nothing else
+  kRisky,    ///< a single point; a worker was lost while it held only this point
+  kFailing   ///< several workers were lost with only this point; it fails unless one returns
 };
 
 struct LossLimits {
-  std::uint32_t suspect_after = 2;  ///< losses of different processes
-  std::uint32_t failing_after = 3;  ///< losses of processes that held only this point
+  std::uint32_t suspect_after = 2;  ///< number of losses of different processes
+  std::uint32_t failing_after = 3;  ///< number of losses of processes that held only this point
 };
 
-/// The losses that a range of points was part of, each process once.
+/// The losses of a range of points. A process counts once.
 class LossHistory {
  public:
-  /// Losses of kNoProcess count each time.
+  /// Adds a loss. A process counts once, but every loss of kNoProcess counts.
   void add(const Loss& loss) {
-    constexpr std::size_t kMaxNoted = 16;  // more losses matter only if `alone`
+    constexpr std::size_t kMaxNoted = 16;  // further losses count only if they are `alone`
     const auto known = std::ranges::find(losses_, loss.process, &Loss::process);
     if (loss.process != kNoProcess && known != losses_.end()) {
       known->alone = known->alone || loss.alone;
@@ -56,8 +56,8 @@ class LossHistory {
       losses_.push_back(loss);
     }
   }
-  /// Removes the losses of a process that returned, so these points did not kill it. Returns
-  /// whether there were any.
+  /// Removes the losses of a process that has returned, because these points did not kill it.
+  /// Returns whether it had losses here.
   bool take_back(ProcessNumber process) {
     return process != kNoProcess &&
            std::erase_if(losses_, [&](const Loss& loss) { return loss.process == process; }) > 0;
@@ -80,30 +80,30 @@ class LossHistory {
   std::vector<Loss> losses_;
 };
 
-/// A worker process. Each of its connections is a worker of its own.
+/// A worker process. Each of its connections counts as one worker.
 struct WorkerProcess {
-  std::string id{};              ///< from WorkerHello; empty if it has none
+  std::string id{};              ///< from WorkerHello; empty if the process sent none
   std::set<WorkerId> workers{};  ///< its connections
-  /// When it first solved leased points; nothing: not yet.
+  /// time at which it first solved leased points; nothing if it has not yet
   std::optional<std::int64_t> proven_since_ms{};
-  std::uint32_t lost_in_a_row = 0;   ///< losses since it last solved something
-  std::uint64_t losses = 0;          ///< its leases that ended without an answer
-  std::set<StudyId> in_histories{};  ///< studies with points whose history may contain it
+  std::uint32_t lost_in_a_row = 0;   ///< number of losses since the process last solved a point
+  std::uint64_t losses = 0;          ///< number of its leases that ended without an answer
+  std::set<StudyId> in_histories{};  ///< studies with this process in a loss history
 };
 
-/// The processes of the workers, including absent ones that may return.
+/// The processes of all workers, including absent processes that may return.
 class WorkerProcesses {
  public:
-  /// Keeps the latest `most_absent` absent processes.
+  /// Keeps at most `most_absent` absent processes, the latest ones.
   explicit WorkerProcesses(std::size_t most_absent) : most_absent_(most_absent) {}
 
   /// Adds a connection of the process `id` and returns the process's number. An empty `id` is a new
   /// process.
   ProcessNumber join(const std::string& id, WorkerId worker);
-  /// Removes a connection. The process may be forgotten.
+  /// Removes a connection. A process without connections may be forgotten.
   void leave(ProcessNumber number, WorkerId worker);
 
-  /// Removes a study whose points are in no history any more.
+  /// Removes a study from all processes, because no loss history of its points exists any more.
   void forget_study(StudyId study);
 
   /// Throws std::out_of_range for a process that was forgotten.
@@ -111,8 +111,8 @@ class WorkerProcesses {
   const WorkerProcess& at(ProcessNumber number) const { return processes_.at(number); }
   std::size_t size() const { return processes_.size(); }
 
-  /// Throws std::logic_error unless exactly the expected processes are kept, with `workers`
-  /// connections in all.
+  /// Throws std::logic_error if the kept processes are not the expected ones, or do not have
+  /// `workers` connections in all.
   void check_invariants(std::size_t workers) const;
 
  private:
@@ -121,8 +121,8 @@ class WorkerProcesses {
   std::size_t most_absent_;
   ProcessNumber last_number_ = kNoProcess;
   std::map<ProcessNumber, WorkerProcess> processes_;
-  std::map<std::string, ProcessNumber> numbers_;  // by id
-  std::deque<ProcessNumber> absent_;              // the earliest first
+  std::map<std::string, ProcessNumber> numbers_;  // number by ID of the process
+  std::deque<ProcessNumber> absent_;              // in the order in which they became absent
 };
 
 }  // namespace oblique::server

@@ -17,7 +17,7 @@ struct Piece {
   std::uint64_t fall;  ///< number of the fall
 };
 
-/// The points from a number on as pieces, and the first open point of each fall.
+/// The points from `first` on as pieces with one fall each, and the first open point of each fall.
 struct Falls {
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
@@ -43,10 +43,11 @@ struct Falls {
   bool is_open(std::uint64_t fall) const { return heads[fall] != kNone; }
 
   std::vector<Piece> pieces;
-  std::vector<std::uint64_t> heads;  ///< first open point by fall; kNone: none
+  std::vector<std::uint64_t> heads;  ///< first open point of each fall, or kNone
 };
 
-/// Whether points of the block with the same fall may be apart. Not if each point has its own fall.
+/// Returns whether points with the same fall may be apart. If each point has its own fall they may
+/// not.
 bool may_share_falls(const protocol::Block& block) {
   const auto axes = protocol::model_axes(block);
   return std::none_of(axes.begin(), axes.end(), [](const protocol::Axis* axis) {
@@ -66,9 +67,9 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
   }
   Falls falls(table, first, open);
   if (falls.pieces.size() == falls.heads.size()) {
-    return;  // no fall is apart
+    return;  // the points of each fall already follow each other
   }
-  // Sorts falls with open points to the front; pieces of one fall follow each other.
+  // Moves falls with open points to the front, and joins the pieces of each fall.
   std::ranges::stable_sort(falls.pieces, {}, [&](const Piece& piece) {
     return std::pair(!falls.is_open(piece.fall), piece.fall);
   });
@@ -83,7 +84,7 @@ void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
       }
       const std::uint64_t head = falls.heads[end->fall];
       if (head == Falls::kNone) {
-        continue;  // these belong to the last group
+        continue;  // points of a fall without open points belong to the last group
       }
       if (number == falls_a_group) {
         break;
@@ -174,7 +175,7 @@ IntervalSet PointOrder::places(const IntervalSet& points) const {
       at += count;
     }
   });
-  std::ranges::sort(parts, {}, &Interval::begin);  // so that each insertion is at the end
+  std::ranges::sort(parts, {}, &Interval::begin);  // each insertion below is then at the end
   IntervalSet places;
   places.insert(parts);
   return places;

@@ -14,14 +14,14 @@
 namespace oblique::server {
 namespace {
 
-/// Longest time between two ticks that counts as silence of the workers. After a longer one the
-/// server itself had not run, and messages of workers still wait to be read.
+/// Maximum time between two ticks that counts as silence of workers. A longer gap means that the
+/// server itself did not run, and that messages of workers may still be unread.
 constexpr std::int64_t kLongestTick_ms = 1000;
 
 constexpr double kPaceWeight = 0.5;
-/// Weight of all earlier messages in the pace of all workers.
+/// Weight of all earlier messages in the average pace of all workers.
 constexpr double kPaceFades = 0.98;
-/// Longer times per point are treated as this one.
+/// Maximum time per point. A message with a longer time does not change the pace.
 constexpr double kLongestPoint_s = 86'400.0;
 
 }  // namespace
@@ -37,7 +37,8 @@ std::vector<Effect> Scheduler::handle(const Event& event, std::int64_t now_ms) {
   return std::exchange(effects_, {});
 }
 
-/// Ignores an event of an unknown study or worker if its handler needs a known one.
+/// Passes an event to its handler. Ignores the event if the handler needs a study or worker that is
+/// unknown.
 template <typename Kind>
 void Scheduler::pass(const Kind& event) {
   if constexpr (requires(Study & study) { on(study, event); }) {
@@ -103,7 +104,7 @@ void Scheduler::on(Study& study, const StudyCancelled& event) {
   study.points.rest(false);
 }
 
-/// Ends all leases and makes workers drop the study. No point counts as lost.
+/// Ends all leases of a study and makes workers drop the study. No point counts as lost.
 void Scheduler::withdraw(StudyId study) {
   for (const LeaseId lease : std::set<LeaseId>(studies_.at(study).leases)) {
     end_lease(lease, std::nullopt);
@@ -135,8 +136,7 @@ void Scheduler::on(Study& study, const PriorityChanged& event) {
 }
 
 void Scheduler::on(Study& study, const FailuresForgotten& event) {
-  // The lease in which a point failed may still run. It must not contain the point when that gets a
-  // new lease.
+  // The failed point must not be in its old lease, which may still run, when it gets a new lease.
   const IntervalSet places = study.points.order().places(event.points);
   for (const LeaseId id : std::set<LeaseId>(study.leases)) {
     const Lease& lease = leases_.at(id);
@@ -186,18 +186,18 @@ void Scheduler::on(const StudyRemoved& event) {
   }
   suspects_.erase(event.study);
   studies_.erase(study);
-  ready_workers_.unpark_all();  // its suspect points may have kept workers from other points
+  ready_workers_.unpark_all();  // workers may have waited for suspect points of this study
 }
 
-/// Gives a study that opens the smallest `served` of its priority, so that it neither waits for
-/// others nor catches up with them.
+/// Sets `served` to the smallest value of all open studies with this priority, so that a study that
+/// becomes open neither waits for others nor catches up with them.
 void Scheduler::level(Study& study) const {
   const std::int64_t rank = -std::int64_t{study.priority};
   const auto least = free_.lower_bound({rank, 0.0, 0});
   study.served = least != free_.end() && std::get<0>(*least) == rank ? std::get<1>(*least) : 0.0;
 }
 
-/// Whether the study has no results, or results of the server's solver version.
+/// Returns whether the study has no results, or results of the server's solver version.
 bool Scheduler::is_current(const Study& study) const {
   return study.solver_version.empty() || study.solver_version == solver_version_;
 }
@@ -227,7 +227,7 @@ void Scheduler::requeue(StudyId id) {
   }
   const bool has_suspect = is_open(study) && study.has_suspect();
   const bool changes_suspect = has_suspect ? suspects_.insert(id).second : suspects_.erase(id) > 0;
-  if ((rank && !had_free) || changes_suspect) {  // some workers must wait for suspect points
+  if ((rank && !had_free) || changes_suspect) {  // other workers may be served now
     ready_workers_.unpark_all();
   }
 }
@@ -276,7 +276,7 @@ void Scheduler::on(Worker& worker, const CreditGiven& event) {
 }
 
 void Scheduler::on(Worker& worker, const HeartbeatReceived& event) {
-  // A lease that the worker does not name after this time never reached it.
+  // A lease older than `lost_after_ms` that the heartbeat does not name never reached the worker.
   const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
   if (worker.probe != 0 && !held.contains(worker.probe) &&
       now_ms_ - *worker.probed_ms > settings_.lost_after_ms) {
@@ -324,7 +324,7 @@ void Scheduler::on(const WorkerUnreachable& event) {
 void Scheduler::on(const Tick&) {
   const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
   last_tick_ms_ = now_ms_;
-  ready_workers_.unpark_all();  // time has passed
+  ready_workers_.unpark_all();  // waiting workers may be served now
   fail_due_points();
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
@@ -332,7 +332,7 @@ void Scheduler::on(const Tick&) {
       worker.last_heard_ms = std::min(now_ms_, worker.last_heard_ms + gap_ms - kLongestTick_ms);
       worker.stored_ms = std::min(now_ms_, worker.stored_ms + gap_ms - kLongestTick_ms);
     }
-    if (held_) {  // results may still wait to be read
+    if (held_) {  // results may have arrived but wait to be read
       worker.stored_ms = now_ms_;
     }
     if (now_ms_ - worker.last_heard_ms > settings_.lost_after_ms) {
@@ -393,11 +393,12 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   Study& study = studies_.at(lease.study);
   study.leases.erase(id);
   const std::vector<Interval> held = open_places(lease);
-  // its twin holds the same points
+  // The other lease for the rest of this batch keeps the points.
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
     if (loss && !held.empty()) {
-      // What killed one worker may kill the other, so keep the history.
+      // The points that killed one worker may kill the other too, so the other lease records the
+      // loss.
       note_process(lease.study, loss->process);
       twin->second.batch.losses.add({loss->process, false});
     }
@@ -419,7 +420,7 @@ std::vector<Interval> Scheduler::open_places(const Lease& lease) const {
       .within(lease.batch.first_place, lease.batch.end());
 }
 
-/// Releases a batch whose points were all answered by other workers.
+/// Ends a lease whose points others have answered, and makes its worker drop the batch.
 void Scheduler::release_if_answered(LeaseId id) {
   const auto lease = leases_.find(id);
   if (lease != leases_.end() && !has_open_points(lease->second)) {
@@ -446,7 +447,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
     if (!store.accepted.empty() && study->second.solver_version.empty()) {
       study->second.solver_version = solver_version_;
     }
-    // The points of a lease that has ended are reported again by another worker.
+    // If the lease has ended, its points were returned, and another worker will report them.
     if (worker.leases.contains(event.lease)) {
       store.left_out = study->second.points.receive(event.left_out);
     }
@@ -474,7 +475,7 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   release_if_answered(twin);
 }
 
-/// Whether the message reports left-out points that are in no lease of the worker.
+/// Returns whether the message reports left-out points that are not in the worker's lease.
 bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   const auto lease = leases_.find(event.lease);
   if (event.left_out.empty() || lease == leases_.end() || lease->second.worker != event.worker) {
@@ -482,7 +483,7 @@ bool Scheduler::reports_foreign_points(const ResultsReceived& event) const {
   }
   const StudyPoints& points = studies_.at(lease->second.study).points;
   const Batch& batch = lease->second.batch;
-  // Such a number is refused without a lookup, which could take long.
+  // Refuses an impossible message before looking up its points, which may take long.
   if (event.left_out.size() > batch.points || lease->second.study != event.study ||
       !points.may_leave_out(event.left_out)) {
     return true;
@@ -498,8 +499,8 @@ void Scheduler::update_pace(Worker& worker, const ResultsReceived& event) {
       event.busy_s / points > kLongestPoint_s) {
     return;
   }
-  // Averages time and points separately: the first points of a model include its fall and do not
-  // show how long later ones take.
+  // Averages time and points separately. The first points of a model include its fall, so their
+  // time per point is not typical.
   const auto learn = [&event](double& busy_s, double& number, double newest) {
     const double weight = number > 0.0 ? kPaceWeight : 1.0;
     busy_s += weight * (event.busy_s - busy_s);
@@ -507,7 +508,7 @@ void Scheduler::update_pace(Worker& worker, const ResultsReceived& event) {
   };
   Pace& known = worker.paces[event.study];
   learn(known.busy_s, known.points, points);
-  // A message with left-out points only does not show how long a point takes.
+  // A message that contains only left-out points does not show how long a point takes.
   if (solved > 0.0) {
     learn(known.solved_busy_s, known.solved, solved);
     pace_s_ = kPaceFades * pace_s_ + event.busy_s;

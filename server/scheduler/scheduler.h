@@ -23,29 +23,29 @@ namespace oblique::server {
 /// Counts of the points of a study.
 struct StudyCounts {
   std::uint64_t points;
-  std::uint64_t completed;  ///< including failed and left-out points
+  std::uint64_t completed;  ///< includes failed and left-out points
   std::uint64_t failed;
-  std::uint64_t left_out;  ///< left out by a filter, as far as workers have reported
+  std::uint64_t left_out;  ///< number of points left out by a filter, as reported by workers so far
   std::uint64_t leased;
   bool cancelled;
-  std::string solver_version;  ///< of its results; empty without results
-  bool is_of_other_solver;     ///< it has open points, but the server has another version
+  std::string solver_version;  ///< version that made its results; empty without results
+  bool is_of_other_solver;     ///< its open points need another solver version
 
   std::uint64_t open() const { return points - completed; }
   std::uint64_t solved() const { return completed - std::min(completed, failed + left_out); }
 };
 
-/// State of a worker: the first of these that applies.
+/// State of a worker. If several apply, the first one counts.
 enum class WorkerState {
-  kSilent,    ///< no message for 1.5 s; heartbeats come every 900 ms
-  kSetAside,  ///< it gets no batch until it has solved a probe
-  kBusy,      ///< it does not read its messages
-  kWorking,   ///< it holds a batch or a probe
+  kSilent,    ///< has sent nothing for 1.5 s; heartbeats come every 900 ms
+  kSetAside,  ///< gets no batch until it has solved a probe
+  kBusy,      ///< does not read its messages
+  kWorking,   ///< holds a batch or a probe
   kIdle,
 };
 inline constexpr std::array kWorkerStates{"silent", "set aside", "busy", "working", "idle"};
 
-/// Number of workers in one state, and of their threads.
+/// Number of workers in one state, and the number of their threads.
 struct WorkerGroup {
   std::uint64_t workers = 0;
   std::uint64_t threads = 0;
@@ -56,20 +56,20 @@ struct WorkerCounts {
   std::uint64_t leased_points;
   std::uint64_t solved_points;
   std::int64_t silent_ms;
-  std::uint64_t losses;  ///< leases of its process that ended without an answer
-  bool is_proven;        ///< its process has solved leased points
+  std::uint64_t losses;  ///< number of its process's leases that ended without an answer
+  bool is_proven;        ///< true if its process has solved leased points
   bool is_set_aside;
   WorkerState state;
 };
 
-/// The workers with credit, first come first served. A worker without suitable points is parked: it
-/// keeps its place and is skipped until something changes for it. So the cost of an event depends
-/// on what it changes, not on the number of waiting workers.
+/// The workers that accept further batches, first come, first served. A worker without suitable
+/// points is parked: it keeps its place and is skipped until something changes for it. So the cost
+/// of an event depends on what it changes, not on the number of waiting workers.
 class ReadyQueue {
  public:
   using ByPlace = std::map<std::uint64_t, WorkerId>;
 
-  /// Appends a worker that is not in the queue.
+  /// Appends a worker that is not in the queue yet.
   void add(WorkerId worker) {
     if (places_.emplace(worker, last_place_ + 1).second) {
       active_.emplace(++last_place_, worker);
@@ -88,7 +88,7 @@ class ReadyQueue {
 
   bool contains(WorkerId worker) const { return places_.contains(worker); }
   std::size_t size() const { return places_.size(); }
-  /// In order of service.
+  /// Workers in order of service.
   const ByPlace& active() const { return active_; }
   const ByPlace& parked() const { return parked_; }
 
@@ -105,48 +105,48 @@ class ReadyQueue {
   std::uint64_t last_place_ = 0;
 };
 
-/// Decides which worker solves which points: (state, event, now) -> effects. Without I/O, clock,
-/// thread and randomness; README.md has the table of states and events. Not thread-safe.
+/// Decides which worker solves which points: (state, event, now) -> effects. Has no I/O, clock,
+/// thread or randomness. README.md has the table of states and events. Not thread-safe.
 class Scheduler {
  public:
-  /// `solver_version` is that of the server and all its workers. A study with results of another
-  /// version is not leased.
+  /// `solver_version` is the version of the server and of all its workers. A study with results of
+  /// another version is not leased.
   explicit Scheduler(const SchedulerSettings& settings, std::string solver_version = {})
       : settings_(settings), solver_version_(std::move(solver_version)) {}
 
-  /// Handles one event at `now_ms` (of a clock that never runs backwards) and returns the effects
-  /// in order. Events of unknown workers and studies have only the effects in the table of
-  /// README.md.
+  /// Handles one event and returns the effects in order. `now_ms` comes from a clock that never
+  /// runs backwards. README.md lists the effects of events about unknown workers and studies.
   std::vector<Effect> handle(const Event& event, std::int64_t now_ms);
 
   bool has_worker(WorkerId worker) const { return workers_.contains(worker); }
   bool has_study(StudyId study) const { return studies_.contains(study); }
   std::size_t workers() const { return workers_.size(); }
-  /// Number of workers that dispatch has examined so far: the cost of dispatch.
+  /// Returns the number of workers that dispatch has examined so far, which measures its cost.
   std::uint64_t examined_workers() const { return examined_workers_; }
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
-  /// Whether every worker must solve a probe before it gets points; true without workers.
+  /// Returns whether every worker must solve a probe before it gets points; true without workers.
   bool sets_all_aside() const;
-  /// Workers by WorkerState.
+  /// Returns the number of workers in each WorkerState.
   WorkerGroups groups(std::int64_t now_ms) const;
   /// Number of leased batches.
   std::size_t leases() const { return leases_.size(); }
-  /// Thread time per point over the last results [s]; 0: unknown.
+  /// Returns the recent thread time per point [s]; 0: unknown.
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
-  /// Time since its last message [ms]. Throws std::out_of_range for an unknown worker.
+  /// Returns the time since the worker's last message [ms]. Throws std::out_of_range if it is
+  /// unknown.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
 
-  /// Throws std::logic_error if the state contradicts itself: a point in two places or in none, a
-  /// lease without worker or study, a leased point without lease, two leases of one point that are
-  /// not twins.
+  /// Throws std::logic_error if the state contradicts itself: a point is in two places or in none,
+  /// a lease has no worker or study, a leased point has no lease, or a point has two leases that
+  /// are not twins.
   void check_invariants() const;
 
  private:
-  /// Order in which studies get batches: minus the priority, `served`, number.
+  /// Sort key of studies that wait for workers: minus the priority, then `served`, then the number.
   using Rank = std::tuple<std::int64_t, double, StudyId>;
   struct Study {
     StudyPoints points;
@@ -155,12 +155,12 @@ class Scheduler {
     bool paused;
     bool finished;
     std::int32_t priority = 0;
-    /// Number of batches leased since the study was last open; long ones count more.
+    /// Number of batches leased since the study was last open. A long batch counts for several.
     double served = 0.0;
-    std::string solver_version{};  ///< of its results and leases; empty: none
+    std::string solver_version{};  ///< version that made its results and leases; empty without both
     std::set<LeaseId> leases{};
     bool held = false;
-    std::optional<Rank> rank{};  ///< its entry in `free_`
+    std::optional<Rank> rank{};  ///< the study's entry in `free_`
 
     bool has_suspect() const {
       return points.has(Suspicion::kSuspect) || points.has(Suspicion::kRisky);
@@ -170,20 +170,20 @@ class Scheduler {
     WorkerId worker;
     StudyId study;
     Batch batch;
-    bool alone;  ///< has suspect points, so its worker gets nothing else
+    bool alone;  ///< true if it has suspect points; its worker then gets no other lease
     std::int64_t granted_ms;
-    LeaseId twin = 0;  ///< lease of another worker for the rest of the same batch; 0: none
+    LeaseId twin = 0;  ///< another worker's lease for the rest of this batch; 0: none
   };
-  /// Pace of a worker in a study.
+  /// How fast a worker solves points of a study.
   struct Pace {
-    double busy_s = 0.0;  ///< thread time for `points`, weighted to the last messages
+    double busy_s = 0.0;  ///< thread time for `points`; recent messages have more weight
     double points = 0.0;
-    /// As `busy_s`, over messages with solved points; `solved` counts only these points.
+    /// Like `busy_s` and `points`, but for messages with solved points, and counting only these.
     double solved_busy_s = 0.0;
     double solved = 0.0;
-    std::uint64_t last_batch_points = 0;  ///< size that its pace allowed
-    std::uint64_t last_end = 0;           ///< place; 0: no batch yet
-    std::uint64_t held_points = 0;        ///< points in its leases
+    std::uint64_t last_batch_points = 0;  ///< points that its pace allowed last
+    std::uint64_t last_end = 0;           ///< place at which its last batch ended; 0: no batch yet
+    std::uint64_t held_points = 0;        ///< number of points in its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
     double s_per_solved() const { return solved > 0.0 ? solved_busy_s / solved : 0.0; }
@@ -191,16 +191,16 @@ class Scheduler {
   struct Worker {
     std::uint32_t threads;
     std::uint32_t credit = 0;
-    bool is_busy = false;  ///< gets no batches
+    bool is_busy = false;  ///< true if it gets no batches
     ProcessNumber process = kNoProcess;
-    LeaseId probe = 0;                        ///< its probe, which it then holds alone; 0: none
-    std::optional<std::int64_t> probed_ms{};  ///< when it got its last probe
+    LeaseId probe = 0;                        ///< lease of its probe, its only lease then; 0: none
+    std::optional<std::int64_t> probed_ms{};  ///< time at which it got its last probe
     std::int64_t last_heard_ms;
-    std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold batches
-    std::size_t solved_batches = 0;  ///< batches solved since it joined or stalled
+    std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold leases
+    std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    std::map<StudyId, std::uint64_t> defined;  ///< number of points in the recipe that was sent
+    std::map<StudyId, std::uint64_t> defined;  ///< number of points in its recipe of each study
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;
@@ -231,16 +231,16 @@ class Scheduler {
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
   void withdraw(StudyId id);
-  /// `loss`: the process that was lost; nothing: its points are given back.
+  /// Ends a lease. `loss` names the lost process; without it the points do not count as lost.
   void end_lease(LeaseId lease, const std::optional<Loss>& loss);
-  /// Places of its batch without an answer.
+  /// Returns the places of the lease's points that have no answer yet.
   std::vector<Interval> open_places(const Lease& lease) const;
   bool has_open_points(const Lease& lease) const { return !open_places(lease).empty(); }
   void release_if_answered(LeaseId lease);
   void remove_worker(WorkerId worker, WorkerEnd how);
   bool reports_foreign_points(const ResultsReceived& event) const;
   void update_pace(Worker& worker, const ResultsReceived& event);
-  /// The shortest thread time per point of any worker, by study; 0: unknown.
+  /// Shortest thread time per point of all workers, by study; 0: unknown.
   using FastestPaces = std::map<StudyId, double>;
   double fastest_pace(StudyId id, FastestPaces& known) const;
   void end_stalled();
@@ -249,7 +249,7 @@ class Scheduler {
   bool is_open(const Study& study) const;
   std::optional<Rank> rank_of(StudyId id, const Study& study) const;
   void level(Study& study) const;
-  /// To be called after every change of a study or its points.
+  /// Updates the queues of studies. Must be called after every change of a study or its points.
   void requeue(StudyId id);
 
   WorkerState state_of(const Worker& worker, std::int64_t now_ms) const;
@@ -285,16 +285,16 @@ class Scheduler {
   SchedulerSettings settings_;
   std::string solver_version_;
   WorkerProcesses processes_{settings_.most_absent_processes};
-  // times at which the last new processes were lost with points
+  // times at which new processes were lost while they held points
   std::deque<std::int64_t> vanished_ms_;
   std::map<StudyId, Study> studies_;
-  std::set<Rank> free_;         // studies with free points to lease, the next one first
+  std::set<Rank> free_;         // studies with free points to lease, in the order of service
   std::set<StudyId> suspects_;  // studies with suspect points to lease
   std::set<StudyId> failing_;   // studies with failing points
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // workers with credit
-  // worker that gets nothing until it is empty, then suspect points; 0: none
+  // worker that gets nothing until it holds nothing, and then suspect points; 0: none
   WorkerId draining_ = 0;
   std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;
@@ -303,7 +303,7 @@ class Scheduler {
   std::int64_t now_ms_ = 0;
   std::int64_t last_tick_ms_ = -1;
   Effects effects_;      // effects of the current event
-  double pace_s_ = 0.0;  // thread time for `pace_points_`, weighted to the last results
+  double pace_s_ = 0.0;  // thread time for `pace_points_`; recent results have more weight
   double pace_points_ = 0.0;
 };
 

@@ -20,7 +20,7 @@ void Scheduler::dispatch() {
   }
 }
 
-/// Uses one credit for a batch or probe; the worker moves to the end of the queue.
+/// Uses one credit of the worker for a batch or probe, and moves it to the end of the queue.
 void Scheduler::use_credit(WorkerId id, Worker& worker) {
   worker.credit -= std::min(worker.credit, 1U);
   ready_workers_.remove(id);
@@ -29,7 +29,7 @@ void Scheduler::use_credit(WorkerId id, Worker& worker) {
   }
 }
 
-/// Whether the worker reads its messages, holds nothing that must be alone, and solves its batches.
+/// Returns whether the worker reads messages, solves batches, and holds no suspect point or probe.
 bool Scheduler::may_hold_more(const Worker& worker) const {
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
   return !worker.is_busy && !holds_suspect && worker.probe == 0 &&
@@ -47,7 +47,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (suspect_study == 0) {
     stop_draining(id);
   } else if (!is_proven(worker)) {
-    // It may need a probe to become proven for them.
+    // A new worker must prove itself with a probe before it gets suspect points.
     if (worker.leases.empty() && free_.empty()) {
       return probe(id, worker);
     }
@@ -55,7 +55,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     serve_suspect(id, worker, suspect_study);
     return true;
   } else if (draining_ == id || draining_ == 0) {
-    // Suspect points wait until one worker is empty; the others continue.
+    // Suspect points need a worker without leases. Only this worker waits for that; others
+    // continue.
     draining_ = id;
     return false;
   }
@@ -65,7 +66,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   const StudyId study = std::get<StudyId>(*free_.begin());
   const BatchSize wanted = batch_size_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
-  // A batch that ended early at the end of a run does not show the worker's capacity.
+  // Stores the wanted size: a batch that ended early at the end of a run does not show the
+  // capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
   return true;
@@ -74,13 +76,13 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
 void Scheduler::serve_suspect(WorkerId id, Worker& worker, StudyId study) {
   StudyPoints& points = studies_.at(study).points;
   stop_draining(id);
-  // Lanes may stay empty, because a quick answer matters more.
+  // Does not fill all lanes, because a quick answer matters more.
   const BatchSize wanted = batch_size_for(worker, study, false);
   grant(id, worker, study, *points.take(*suspect_for(points, worker), wanted), true);
 }
 
-/// Without other points to lease, gives the rest of slow batches to idle workers too. The first
-/// answer wins.
+/// If no other points can be leased, leases the rest of slow batches to idle workers too. The first
+/// answer counts.
 void Scheduler::duplicate_stragglers() {
   const auto is_old = [this](const Lease& lease) {
     return now_ms_ - lease.granted_ms >= settings_.straggler_after_ms;
@@ -98,11 +100,12 @@ void Scheduler::duplicate_stragglers() {
       }
     }
   }
-  for (const WorkerId id : set_aside) {  // they may help after solving a probe
+  // workers that are set aside may help after they have solved a probe
+  for (const WorkerId id : set_aside) {
     probe(id, workers_.at(id));
   }
   FastestPaces paces;
-  // Lease numbers ascend, so the oldest comes first.
+  // Lease numbers ascend, so the oldest lease comes first.
   for (auto entry = leases_.begin(); entry != leases_.end() && is_old(entry->second); ++entry) {
     Lease& lease = entry->second;
     const auto helper = std::find_if(helpers.begin(), helpers.end(),
@@ -126,7 +129,7 @@ bool Scheduler::is_straggling(const Lease& lease, FastestPaces& paces) const {
   }
   const Worker& holder = workers_.at(lease.worker);
   if (leases_.at(*holder.leases.begin()).granted_ms < lease.granted_ms) {
-    return true;  // it waits for another batch of its worker
+    return true;  // its worker must first solve an older batch
   }
   const double expected_ms = 1e3 * fastest_pace(lease.study, paces) *
                              static_cast<double>(lease.batch.points) / holder.threads;
@@ -140,9 +143,9 @@ StudyId Scheduler::next_suspect_study(const Worker& worker) const {
   return found == suspects_.end() ? 0 : *found;
 }
 
-/// The suspicion of the points that the worker may get, or nothing. Risky points go to the worker
-/// that is least likely to be lost for other reasons. A new worker gets none, but a result here
-/// allows a probe.
+/// Returns the suspicion of the points that the worker may get, or nothing. A risky point first
+/// goes to the worker that has been proven longest, because that worker is least likely to be lost
+/// for other reasons. An unproven worker gets no such points; a result here lets it get a probe.
 std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
                                                 const Worker& worker) const {
   if (points.has(Suspicion::kRisky) &&
@@ -157,7 +160,7 @@ std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
 void Scheduler::stop_draining(WorkerId worker) {
   if (draining_ == worker) {
     draining_ = 0;
-    ready_workers_.unpark_all();  // another worker may have to drain
+    ready_workers_.unpark_all();  // another worker may have to give up its leases first
   }
 }
 
@@ -176,7 +179,7 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
         static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / settings_.batch_target_s);
   }
   if (studies_.at(id).points.has_filter()) {
-    // All points of the next batch may pass the filter, even if most of the last did not.
+    // All points of the next batch may pass the filter, even if most of the last batch did not.
     const double in_time =
         pace.s_per_solved() > 0.0
             ? settings_.lanes_batch_s * worker.threads / pace.s_per_solved()
@@ -197,16 +200,16 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
   return wanted;
 }
 
-/// Adds points or models to a batch that would leave lanes empty and would take nearly as long.
+/// Adds points or models to a batch if SIMD lanes would be empty and the batch takes hardly longer.
 void Scheduler::fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                            const Pace& pace) const {
   const auto lanes = static_cast<double>(settings_.lanes);
   const bool has_models = points.has_models();
   if (!has_models && pace.s_per_point() * lanes <= settings_.batch_target_s) {
-    return;  // the batch has enough quick points of one model
+    return;  // the batch fills the lanes anyway, because its points are quick
   }
-  // At most its share of all open points, including those that it holds, so that all workers have
-  // points at the end of a study.
+  // A worker gets at most its share of all open points, counting those it already holds, so that
+  // all workers have points until the end of a study.
   const std::uint64_t open = points.free() + points.leased();
   const std::uint64_t all_threads = std::max<std::uint64_t>(threads_, 1);
   const std::uint64_t part = (open * threads + all_threads - 1) / all_threads;
@@ -238,7 +241,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   Study& served = studies_.at(study);
   Pace& pace = worker.paces[study];
   const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
-  // No reported pace may give a batch a duration without limit.
+  // Limits the duration that counts, because a worker may report any pace.
   const double counted_s = std::clamp(takes_s, settings_.batch_target_s,
                                       settings_.lanes_batch_s + settings_.batch_target_s);
   served.served += counted_s / settings_.batch_target_s;

@@ -1,4 +1,4 @@
-// Invariants of the scheduler's state between two events.
+// Checks the invariants of the scheduler's state between two events.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -71,7 +71,7 @@ void Scheduler::check_leases() const {
             "a lease of suspect points is not alone at a proven worker");
     require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
             "a lease is malformed");
-    // A batch, also an answered one, may contain completed points of others.
+    // Completed points in a batch are ignored, because another lease may have answered them.
     IntervalSet& covered = under_lease[lease.study];
     for (const Interval& held : open_places(lease)) {
       require(lease.twin != 0 || covered.within(held.begin, held.end).empty(),

@@ -1,4 +1,4 @@
-// Lost workers: consequences for their points and their processes.
+// Consequences of lost workers for their points and their processes.
 #include <algorithm>
 #include <map>
 #include <optional>
@@ -26,7 +26,7 @@ std::vector<Interval> split(const Interval& interval, std::uint64_t parts) {
 
 // ---- Points -----------------------------------------------------------------------------------
 
-/// Records that the process was lost with points of that study and may return.
+/// Records that the process was lost with points of this study and may return.
 void Scheduler::note_process(StudyId study, ProcessNumber process) {
   if (process != kNoProcess) {
     processes_.at(process).in_histories.insert(study);
@@ -40,8 +40,7 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   LossHistory losses = lease.batch.losses;
   losses.add(loss);
   const Suspicion suspicion = losses.suspicion(settings_.loss_limits);
-  // The parts are suspect too. Those without the harmful point get solved; the other is split
-  // again.
+  // The parts are suspect too. Parts without the harmful point are solved; the rest is split again.
   const std::uint64_t parts = suspicion == Suspicion::kSound ? 1 : settings_.suspect_parts;
   for (const Interval& interval : held) {
     points.give_back(split(interval, parts), lease.batch.attempts + 1, losses, now_ms_);
@@ -51,7 +50,7 @@ void Scheduler::note_loss(const Lease& lease, const std::vector<Interval>& held,
   }
 }
 
-/// The process is alive, so the points that it held when it was lost did not kill it.
+/// Removes the losses of a process that is alive: the points that it held did not kill it.
 void Scheduler::take_back_losses(ProcessNumber number) {
   const std::set<StudyId> in_histories = std::exchange(processes_.at(number).in_histories, {});
   for (const StudyId study : in_histories) {
@@ -63,7 +62,7 @@ void Scheduler::take_back_losses(ProcessNumber number) {
   }
 }
 
-/// Fails points for which no lost process has returned in time.
+/// Fails each failing point if no process that was lost with it has returned in time.
 void Scheduler::fail_due_points() {
   for (const StudyId id : std::set<StudyId>(failing_)) {
     StudyPoints& points = studies_.at(id).points;
@@ -83,7 +82,7 @@ void Scheduler::fail_due_points() {
 
 // ---- Workers ----------------------------------------------------------------------------------
 
-/// Updates the worker's process at its end, with the leases that it still holds.
+/// Records the end of a worker, and of its leases, in its process.
 void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   if (worker.leases.empty()) {
     return;
@@ -136,9 +135,9 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   }
 }
 
-/// Gives the batches of stalled workers to others. A stalled worker may be slow or may never solve
-/// anything, so nothing counts as lost, its late results are stored, and it gets points again after
-/// it has solved something.
+/// Ends the leases of stalled workers, so that others get the points. A stalled worker may be slow
+/// or may never solve anything. So nothing counts as lost, late results of the worker are stored,
+/// and it gets points again after it has solved one.
 void Scheduler::end_stalled() {
   FastestPaces paces;
   bool any_stalled = false;
@@ -178,12 +177,13 @@ double Scheduler::fastest_pace(StudyId id, FastestPaces& known) const {
   return fastest->second;
 }
 
-/// How long the worker may store nothing before it counts as stalled.
+/// Returns the time without stored points after which the worker counts as stalled [ms].
 std::int64_t Scheduler::longest_stall_ms(const Worker& worker, FastestPaces& paces) const {
   double longest_s = 0.0;
   for (const LeaseId id : worker.leases) {
     const Lease& lease = leases_.at(id);
-    // A thread solves its lanes side by side, and a single point takes as long.
+    // A thread solves its lanes side by side, so a single point takes as long as a full set of
+    // lanes.
     const double points = std::max(static_cast<double>(lease.batch.points) / worker.threads,
                                    static_cast<double>(settings_.lanes));
     longest_s = std::max(longest_s, fastest_pace(lease.study, paces) * points);
@@ -197,7 +197,8 @@ bool Scheduler::is_proven(const Worker& worker) const {
   return processes_.at(worker.process).proven_since_ms.has_value();
 }
 
-/// Whether its process was lost repeatedly, or is new while new processes are being lost.
+/// Returns whether the worker's process was lost repeatedly, or is new while new ones are being
+/// lost.
 bool Scheduler::is_set_aside(const Worker& worker) const {
   const WorkerProcess& process = processes_.at(worker.process);
   return process.lost_in_a_row >= settings_.set_aside_after ||
@@ -205,7 +206,7 @@ bool Scheduler::is_set_aside(const Worker& worker) const {
           now_ms_ - vanished_ms_.front() <= settings_.newcomers_watched_ms);
 }
 
-/// Whether no other worker that is not set aside has been proven for longer.
+/// Returns whether no other worker has been proven for longer, ignoring workers that are set aside.
 bool Scheduler::is_longest_proven(const Worker& worker) const {
   const auto since_ms = processes_.at(worker.process).proven_since_ms;
   return since_ms && std::ranges::none_of(workers_, [&](const auto& entry) {
@@ -214,7 +215,8 @@ bool Scheduler::is_longest_proven(const Worker& worker) const {
          });
 }
 
-/// Sends a probe, an easy point, unless the worker got one recently.
+/// Sends a probe, which is an easy point, unless the worker got one recently. Returns whether it
+/// did.
 bool Scheduler::probe(WorkerId id, Worker& worker) {
   if (!worker.leases.empty() ||
       (worker.probed_ms && now_ms_ - *worker.probed_ms < settings_.probe_interval_ms)) {

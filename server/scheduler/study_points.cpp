@@ -9,8 +9,8 @@
 namespace oblique::server {
 namespace {
 
-/// The end of a group near `end`, at most `most`, because two workers that share a group both solve
-/// its falls. A group with too many points is shared.
+/// Returns a batch end near `end`, at most `most`, that does not split the group `cut`, because two
+/// workers that share a group both solve its falls. A group that is too large is split.
 std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_t end,
                           std::uint64_t most) {
   if (cut.begin > first && 2 * (cut.begin - first) >= end - first) {
@@ -50,7 +50,7 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
   }
   for (Returned& intervals : returned_) {
     for (const auto& [first, returned] : std::exchange(intervals, {})) {
-      const History& history = returned;  // Clang cannot capture a structured binding
+      const History& history = returned;  // Clang cannot capture a structured binding in a lambda
       order_.places(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
         History& part = intervals.emplace(interval.begin, history).first->second;
         part.end = interval.end;
@@ -61,7 +61,7 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
 
 void StudyPoints::rest(bool has_leases) {
   table_.release();
-  if (is_complete() && !has_leases) {  // without order, places equal points
+  if (is_complete() && !has_leases) {  // without an order, places equal points
     order_ = {};
     was_arranged_ = false;
     begun_until_ = 0;
@@ -173,7 +173,7 @@ std::uint64_t StudyPoints::complete_reused(const IntervalSet& points) {
   return places.size();
 }
 
-/// Removes those of these places that are neither committing nor completed from their sets.
+/// Removes these places from the fresh, leased and returned points. Returns the removed places.
 IntervalSet StudyPoints::extract(const IntervalSet& places) {
   IntervalSet extracted;
   places.for_each([&](const Interval& range) {
@@ -188,7 +188,7 @@ IntervalSet StudyPoints::extract(const IntervalSet& places) {
   return extracted;
 }
 
-/// Removes the parts of the intervals that lie in the range, and returns them.
+/// Removes the parts of `intervals` that lie in `range`, and returns them.
 std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Interval& range) {
   std::vector<Interval> parts;
   auto interval = intervals.upper_bound(range.begin);
@@ -234,7 +234,7 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
   const std::uint64_t room = free.end - free.begin;
   const std::uint64_t most = free.begin + std::min(std::max(points, wanted.most_points), room);
   std::uint64_t end = free.begin + std::min(points, room);
-  // At least `groups` whole groups, if there is room.
+  // Takes at least `groups` whole groups if they end before `most`.
   std::uint64_t groups_end = group.end;
   for (std::uint64_t groups = 1; groups < wanted.groups && groups_end < most; ++groups) {
     const std::uint64_t next = order.group_at(table, groups_end).end;
@@ -272,10 +272,10 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
 }
 
-/// The next fresh points for a batch that ends at `end`, has `leased` points and wants `enough`.
-/// They are behind a few completed ones, as where a finer grid has reused a coarser one. Excludes
-/// the rest of the run up to `run_end`, where the batch was cut, and a group whose points do not
-/// all fit.
+/// Returns the next fresh points for a batch that ends at `end` and has `leased` of `enough`
+/// points. Only a few completed points may lie in between, as in a fine grid that has reused
+/// results of a coarse grid. Returns none in the run up to `run_end`, where the batch was cut, and
+/// none of a group whose points do not all fit.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
                                                 std::uint64_t enough, std::uint64_t leased) const {
   constexpr std::uint64_t kNear = 64;
@@ -292,7 +292,7 @@ std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t
   return next;
 }
 
-/// Leases fresh points from the start of `free`. Returns where they end.
+/// Leases fresh points from the start of `free`. Returns the place at which they end.
 std::uint64_t StudyPoints::lease_fresh(const Interval& free, const BatchSize& wanted) {
   const std::uint64_t end = end_of_batch(*table_.get(), order_, free, wanted);
   fresh_.erase(free.begin, end);
@@ -316,7 +316,8 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   if (!order_.is_arranged()) {
     return fresh_.front();
   }
-  // The worker that began the group continues with its first falls; this one gets its last falls.
+  // The worker that began the group continues with its first falls, so this one gets the last
+  // falls.
   const Interval last = fresh_.back();
   return Interval{last.begin + (last.end - last.begin) / 2, last.end};
 }

@@ -17,127 +17,130 @@ namespace oblique::server {
 
 /// The size of a batch that a worker wants.
 struct BatchSize {
-  std::uint64_t points;           ///< target number; the batch ends with a group if one ends nearby
-  std::uint64_t groups = 1;       ///< minimum number of groups, if `most_points` allows
-  std::uint64_t most_points = 0;  ///< maximum number, to complete a group or `groups`; 0: `points`
-  /// Number of falls that the worker solves side by side: the size of groups if the study is
-  /// arranged now. 0: it must not be arranged, because leases refer to places.
+  std::uint64_t points;      ///< target number; a batch ends with a group near it
+  std::uint64_t groups = 1;  ///< minimum number of groups, if they fit into `most_points`
+  /// maximum number of points if that completes groups; 0: same as `points`
+  std::uint64_t most_points = 0;
+  /// Number of falls that the worker solves side by side, which becomes the size of groups if the
+  /// study is arranged now. 0 if it must not be arranged, because leases refer to places.
   std::uint64_t falls = 0;
   /// The place at which the worker's last batch ended. The rest of that batch's last group comes
-  /// first, because the worker has solved its falls.
+  /// first, because the worker has already solved its falls.
   std::optional<std::uint64_t> follows{};
 };
 
-/// The place at which a batch from the start of `free` ends. It has at least one point, and exactly
-/// one if one is wanted.
+/// Returns the place at which a batch from the start of `free` ends. The batch has at least one
+/// point, and exactly one if `wanted` is one point.
 std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& order,
                            const Interval& free, const BatchSize& wanted);
 
-/// Points that are leased together: a run of places (PointOrder), except those of points that were
-/// completed before.
+/// Points that are leased together: a run of places (PointOrder). Points in the run that were
+/// completed before are not leased.
 struct Batch {
   std::uint64_t first_place;
   std::uint64_t count;
-  std::uint32_t attempts;        ///< how often these points were leased before
+  std::uint32_t attempts;        ///< number of earlier leases of these points
   LossHistory losses;            ///< losses of earlier leases
   std::uint64_t points = count;  ///< number of leased points at these places
 
   std::uint64_t end() const { return first_place + count; }
 };
 
-/// The state of each point of a study. Every point is in exactly one set: fresh (never leased by
-/// this run of the server), returned (with one of four levels of suspicion from its losses),
-/// leased, committing (its result is being written) or completed. The cost depends on the number of
-/// intervals, not of points. Intervals, here and in Batch, consist of places: the first lease
-/// orders the points so that those with the same fall follow each other.
+/// The state of each point of a study. Every point is in exactly one set:
+/// - fresh: never leased by this run of the server
+/// - returned: leased before; each level of suspicion has a set of its own
+/// - leased
+/// - committing: its result is being written
+/// - completed: it has a row, or a filter leaves it out
 ///
-/// Points that a filter leaves out are leased like all others. The worker reports them, and they
-/// are completed without a row.
+/// The cost depends on the number of intervals, not of points. Intervals, here and in Batch,
+/// consist of places: the first lease orders the points so that those with the same fall follow
+/// each other. Points that a filter leaves out are leased like all others; the worker reports them.
 class StudyPoints {
  public:
-  /// `completed` contains the completed points, of which a filter leaves out `left_out`. Does not
-  /// make the table of a complete study.
+  /// `completed` contains the completed points, among them `left_out` points that a filter leaves
+  /// out. Does not make the table of a complete study.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 
   std::uint64_t size() const { return table_.size(); }
-  /// Whether the points have several models. Makes the table if necessary.
+  /// Returns whether the points have several models. Makes the table if necessary.
   bool has_models() const { return table_->models() > 1; }
   /// Releases the table until the next lease, and the order of a complete study without leases.
   void rest(bool has_leases);
   /// The current mapping between points and places.
   const PointOrder& order() const { return order_; }
 
-  /// Leases returned sound points or, if there are none, fresh ones: first the rest of the group
-  /// that `wanted` follows, then groups that were not begun, then the second half of the rest of
-  /// the last group. Nothing if there are none.
+  /// Leases returned sound points or, if there are none, fresh points: first the rest of the group
+  /// at `wanted.follows`, then groups that no worker has begun, then the second half of the rest of
+  /// the last group. Returns nothing if no point is left.
   std::optional<Batch> take(const BatchSize& wanted);
-  /// Leases returned points of that suspicion.
+  /// Leases returned points with this level of suspicion.
   std::optional<Batch> take(Suspicion suspicion, const BatchSize& wanted);
-  /// A point that fails, with the reason.
+  /// A point that fails, and the reason.
   struct Failure {
     std::uint64_t point;
     std::uint32_t attempts;
-    std::uint32_t alone;  ///< losses of workers that held only this point
+    std::uint32_t alone;  ///< number of workers that were lost while they held only this point
   };
-  /// Returns the points that reached kFailing at `until_ms` or before, and moves them to
-  /// committing.
+  /// Returns the points that have been failing since `until_ms`, and moves them to committing.
   std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
-  /// Returns the points at the places `parts`, in order, that are still leased, with the given
-  /// history, at `now_ms`. Points between the parts do not change.
+  /// Returns the leased points at the places `parts` to the sets of returned points, with the given
+  /// history, at `now_ms`. `parts` are in order. Points between the parts do not change.
   void give_back(std::span<const Interval> parts, std::uint32_t attempts, const LossHistory& losses,
                  std::int64_t now_ms);
 
-  /// Removes the losses of this process from the histories of returned points.
+  /// Removes the losses of this process from the histories of all returned points.
   void take_back_losses(ProcessNumber process);
 
-  /// Moves a point whose result was received to committing. False if it was received before or is
-  /// not in the study.
+  /// Moves a point whose result was received to committing. Returns false if it was received before
+  /// or is not in the study.
   bool receive(std::uint64_t point);
 
-  /// The same for left-out points. Returns those that are committing now.
+  /// Moves received left-out points to committing. Returns the moved points.
   IntervalSet receive(const IntervalSet& left_out);
 
-  /// Completes a point whose result is durable. False if it was not committing.
+  /// Completes a point whose result is durable. Returns false if the point was not committing.
   bool complete(std::uint64_t point);
-  /// Completes those of these left-out points that are committing.
+  /// Completes these left-out points, if they are committing.
   void complete(const IntervalSet& left_out);
 
-  /// Appends fresh points to the study; `table` contains all points.
+  /// Appends fresh points to the study; `table` contains all points of the study.
   void grow(StudyTable table);
 
-  /// Completes those of these points that are neither completed nor committing, because they have a
-  /// reused row. Returns their number.
+  /// Completes these points, which have a reused row, unless they are completed or committing.
+  /// Returns the number of completed points.
   std::uint64_t complete_reused(const IntervalSet& points);
 
-  /// Makes the completed ones of these points fresh. Returns their number.
+  /// Moves these points from completed to fresh. Returns the number of moved points.
   std::uint64_t reopen(const IntervalSet& points);
 
   bool has_free() const { return has(Suspicion::kSound) || !fresh_.empty(); }
   bool has_filter() const { return table_->has_filter(); }
-  /// Whether all of these points are in blocks with a filter.
+  /// Returns whether all of these points are in blocks with a filter.
   bool may_leave_out(const IntervalSet& points) const;
-  /// Whether there are returned points of that suspicion.
+  /// Returns whether any returned points have this level of suspicion.
   bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
-  /// When the next points of that suspicion were returned. There must be one.
+  /// Returns when the next points of this level were returned. There must be such points.
   std::int64_t returned_ms(Suspicion suspicion) const {
     return returned(suspicion).begin()->second.returned_ms;
   }
   bool is_complete() const { return completed() >= size(); }
-  /// Whether some point has a result, durable or being written. Left-out points have none.
+  /// Returns whether any point has a result, durable or being written. Left-out points have none.
   bool has_results() const {
     return completed() + committing_.size() > left_out_ + committing_left_out_;
   }
 
   std::uint64_t free() const { return fresh_.size() + returned_points_; }
   std::uint64_t completed() const { return completed_.size(); }
-  std::uint64_t left_out() const { return left_out_; }  ///< left out by a filter; all completed
+  /// number of points that a filter leaves out; all of them are completed
+  std::uint64_t left_out() const { return left_out_; }
   std::uint64_t leased() const { return leased_.size(); }
   /// The leased places.
   const IntervalSet& leased_set() const { return leased_; }
 
-  /// Throws std::logic_error unless every point is in exactly one place.
+  /// Throws std::logic_error unless every point is in exactly one set.
   void check_invariants() const;
 
  private:
@@ -167,8 +170,8 @@ class StudyPoints {
   PointOrder order_;
   LossLimits limits_;
   IntervalSet fresh_;
-  std::uint64_t begun_until_ = 0;  // end of the last group of which points were leased
-  bool was_arranged_ = false;      // `arrange` was called, even if it changed nothing
+  std::uint64_t begun_until_ = 0;  // end of the last group with points that were leased
+  bool was_arranged_ = false;      // true if `arrange` was called, even if it changed nothing
   std::uint64_t falls_a_group_ = 1;
   std::array<Returned, 4> returned_;  // by suspicion
   IntervalSet leased_;
@@ -176,7 +179,7 @@ class StudyPoints {
   IntervalSet completed_;
   std::uint64_t left_out_;  // number of completed points that a filter leaves out
   std::uint64_t committing_left_out_ = 0;
-  std::uint64_t returned_points_ = 0;  // of any suspicion
+  std::uint64_t returned_points_ = 0;  // number of returned points of all levels
 };
 
 }  // namespace oblique::server

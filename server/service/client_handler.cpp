@@ -15,7 +15,7 @@
 namespace oblique::server {
 namespace {
 
-/// Number of studies or workers in a reply; 0 requested: the maximum.
+/// Returns the number of studies or workers in a reply. A request for 0 gets the maximum.
 int page_size(std::uint32_t requested) {
   return static_cast<int>(requested == 0 ? limits::kListed : std::min(requested, limits::kListed));
 }
@@ -42,7 +42,7 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
       continue;
     }
     if (client.request_id != 0 && request.client == client) {
-      return;  // repeated by the client because the answer takes long
+      return;  // the client repeats the request because the answer takes long
     }
     ++of_all;
     bytes += request.frame->size();
@@ -84,7 +84,7 @@ void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Insta
   answer({waiting.identity, read.request_id, waiting.holder}, read, {}, now);
 }
 
-/// Why the request is refused whatever its kind, or an empty text.
+/// Returns why a request of any kind is refused, or an empty text.
 std::string ClientHandler::request_error(const Client& client, const ReadRequest& read) {
   const protocol::ClientRequest& request = read.request;
   const WriteLedger& ledger = core_.ledger;
@@ -172,7 +172,7 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, std::s
 void ClientHandler::query(const Client& client, const protocol::QueryRequest& request,
                           Instant now) {
   if (find(client.identity, client.request_id) != pending_.end()) {
-    return;  // repeated by the client because the answer takes long
+    return;  // the client repeats the request because the answer takes long
   }
   const std::uint64_t ticket = ++last_ticket_;
   if (stopping_) {
@@ -222,7 +222,7 @@ void ClientHandler::query_report(QueryReport report) {
   }
   protocol::ClientReply number;
   number.set_request_id(query.client.request_id);
-  // Concatenated encoded messages decode to one message with all their fields.
+  // Concatenated encodings of messages decode to one message with the fields of all.
   const bool is_there =
       core_.ports.to_client(query.client.identity, protocol::encode(number) + report.reply);
   ++query.sent;
@@ -247,7 +247,7 @@ ClientHandler::PendingRequests::iterator ClientHandler::cancel(PendingRequests::
     core_.ports.cancel_query(request->first);
   }
   if (const auto& job = request->second.trace; job && job->worker) {
-    // The worker need not continue; it gets another order after it has answered.
+    // The worker may stop solving. It gets its next order after it has answered this one.
     protocol::ServerToWorker message;
     message.mutable_trace_cancel()->set_trace_id(request->first);
     core_.workers.send(*job->worker, message);

@@ -19,7 +19,7 @@
 namespace oblique::server {
 
 struct ClientHandlerSettings {
-  /// Interval of StillWorking messages. If one cannot be sent, the client is gone.
+  /// Interval of StillWorking messages. A client to which none can be sent counts as gone.
   std::int64_t still_working_every_ms = 1000;
   std::string access = "loopback";  ///< value of StatusReply.access
   std::string version{};            ///< value of StatusReply.version
@@ -30,7 +30,7 @@ struct QueryCounts {
   std::uint64_t running = 0;
 };
 
-/// Handles requests of clients: answers those about status, and passes on changes, queries and
+/// Handles requests of clients: answers requests for status, and passes on changes, queries and
 /// traces. Frames may be malicious. Not thread-safe.
 class ClientHandler {
  public:
@@ -38,20 +38,20 @@ class ClientHandler {
                 StudyChanges& changes)
       : settings_(std::move(settings)), core_(core), log_(log), changes_(changes) {}
 
-  /// `holder`: the client's key; null without keys.
+  /// `holder` is the client's key; null without keys.
   void frame(const std::string& identity, std::string_view frame, Instant now,
              const std::shared_ptr<const KeyIdentity>& holder);
   void query_report(QueryReport report);
   void trace_received(WorkerId worker, protocol::Trace trace);
-  /// A worker left for any reason; WorkerSessions must already have removed it.
+  /// Handles the end of a worker. WorkerSessions must already have removed it.
   void worker_left(WorkerId worker);
-  /// The client has disconnected, and all its requests were handled.
+  /// Handles a client's disconnection, after all requests that it sent.
   void client_left(std::string_view identity);
-  /// To be called several times a second.
+  /// Must be called several times a second.
   void tick(Instant now);
-  /// No further study is accepted, because the server will stop.
+  /// Refuses new studies from now on, because the server will stop.
   void drain() { draining_ = true; }
-  /// Pending and later requests get an error, because the server stops.
+  /// Answers pending and later requests with an error, because the server stops.
   void stop();
 
   QueryCounts query_counts() const;
@@ -62,17 +62,17 @@ class ClientHandler {
     bool only_point;
     std::int64_t deadline_ms;
     protocol::TraceOrder order{};
-    protocol::TraceReply reply{};      ///< all fields but the trace
-    bool is_ready = false;             ///< the inputs of the point are known
-    std::optional<WorkerId> worker{};  ///< worker that solves it
-    std::set<WorkerId> declined_by{};  ///< workers that declined it
+    protocol::TraceReply reply{};      ///< all fields except the trace
+    bool is_ready = false;             ///< true if the inputs of the point are known
+    std::optional<WorkerId> worker{};  ///< the worker that solves it
+    std::set<WorkerId> declined_by{};  ///< the workers that declined it
     bool has_lost_worker = false;
   };
   /// A request that waits for the check thread, the query pool or a worker.
   struct Pending {
     Client client;
-    std::int64_t next_sign_ms;                   ///< time of the next StillWorking
-    std::shared_ptr<const std::string> frame{};  ///< frame to check
+    std::int64_t next_sign_ms;                   ///< time at which the next StillWorking is due
+    std::shared_ptr<const std::string> frame{};  ///< frame to check; null for a query or trace
     std::optional<TraceJob> trace{};
     bool runs = false;
     std::uint64_t sent = 0;      ///< number of chunks sent
@@ -85,7 +85,7 @@ class ClientHandler {
   void check(const Client& client, std::string_view frame, Instant now);
   void checked(std::uint64_t ticket, const ReadRequest& read, Instant now);
   std::string request_error(const Client& client, const ReadRequest& read);
-  /// Answers the request `read` from `frame`, or has it checked first.
+  /// Answers `read`, which was parsed from `frame`, or lets the check thread validate it first.
   void answer(const Client& client, const ReadRequest& read, std::string_view frame, Instant now);
   void query(const Client& client, const protocol::QueryRequest& request, Instant now);
   void more_rows(const Client& client, const protocol::MoreRows& request);
@@ -95,13 +95,13 @@ class ClientHandler {
   void workers(const Client& client, const protocol::WorkersRequest& request, Instant now);
   void trace(const Client& client, const protocol::TraceRequest& request, Instant now);
   protocol::StudyStatus status_of(StudyId id, Instant now) const;
-  /// The durable study of that number or, if that is 0, of that name. If there is none the client
-  /// gets an error.
+  /// Returns the durable study with number `id` or, if `id` is 0, with that name. Sends the client
+  /// an error if there is none.
   std::optional<StudyId> find_study(const Client& client, const std::string& name, StudyId id = 0);
-  /// The query or trace with that request number.
+  /// Returns the client's query or trace with that request number.
   PendingRequests::iterator find(std::string_view identity, std::uint64_t request_id);
   Pending& add(std::uint64_t ticket, const Client& client, Instant now);
-  /// Remove a request and return the next one.
+  /// Remove a request and return the next request.
   PendingRequests::iterator cancel(PendingRequests::iterator request);
   PendingRequests::iterator refuse(PendingRequests::iterator request, const std::string& reason);
   static protocol::ClientReply find_point(const StudyTable& study, bool is_table_made,
@@ -118,8 +118,8 @@ class ClientHandler {
   StudyChanges& changes_;
   PendingRequests pending_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  std::size_t point_checks_ = 0;  // running checks of traces, also for clients that are gone
-  // tickets of trace orders without an answer, by worker
+  std::size_t point_checks_ = 0;  // running checks of traces, also for absent clients
+  // ticket of the trace order that a worker has not answered yet
   std::map<WorkerId, std::uint64_t> orders_;
   bool stopping_ = false;
   bool draining_ = false;

@@ -1,4 +1,4 @@
-// Requests for traces: finds the point and a worker.
+// Handles requests for traces: computes the point's inputs and chooses a worker.
 
 #include <algorithm>
 #include <cstddef>
@@ -32,7 +32,7 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
     return;
   }
   if (find(client.identity, client.request_id) != pending_.end()) {
-    return;  // repeated by the client because the answer takes long
+    return;  // the client repeats the request because the answer takes long
   }
   const auto waiting = static_cast<std::size_t>(std::ranges::count_if(
       pending_, [](const auto& entry) { return entry.second.trace.has_value(); }));
@@ -73,12 +73,12 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
   });
 }
 
-/// The reply without the trace, or an error. May run on the check thread unless the table is
-/// already made.
+/// Returns the reply without the trace, or an error. May run on the check thread unless the table
+/// is already made.
 protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is_table_made,
                                                 std::uint64_t point) {
   try {
-    // A table of its own, from a copy of the recipe's bytes.
+    // If the table is not made, uses a table of its own, because this may be the check thread.
     const auto table =
         is_table_made ? study.get() : StudyTable(study.recipe_bytes(), study.size()).get();
     const std::string error = point >= table->size()
@@ -107,7 +107,7 @@ protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is
 void ClientHandler::point_found(std::uint64_t ticket, protocol::ClientReply found) {
   const auto request = pending_.find(ticket);
   if (request == pending_.end()) {
-    return;  // the client is gone
+    return;  // the client has disconnected
   }
   TraceJob& job = *request->second.trace;
   if (found.has_error() || job.only_point) {
@@ -151,7 +151,7 @@ void ClientHandler::trace_received(WorkerId worker, protocol::Trace trace) {
   const WorkerRecord* const record = core_.workers.find(worker);
   const auto order = orders_.find(worker);
   if (record == nullptr || order == orders_.end() || order->second != trace.trace_id()) {
-    return;  // from an earlier session
+    return;  // the trace belongs to an earlier session
   }
   orders_.erase(order);
   if (const auto request = pending_.find(trace.trace_id()); request != pending_.end()) {
@@ -215,7 +215,7 @@ void ClientHandler::dispatch_traces() {
   }
 }
 
-/// A free worker; 0: all are busy; nothing: no connected worker accepts the job.
+/// Returns a free worker; 0 if all are busy; nothing if no connected worker accepts the job.
 std::optional<WorkerId> ClientHandler::free_worker(const TraceJob& job) const {
   std::optional<WorkerId> free;
   for (const auto& [id, worker] : core_.workers.all()) {

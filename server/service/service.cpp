@@ -48,7 +48,7 @@ void Service::restore(StoredStudy study, const std::string& only_study, Instant 
   const StudyId id = study.study_id;
   states_.restore(study, now.steady_ms);
   const bool is_excluded = !only_study.empty() && study.name != only_study;
-  const bool looks_up = study.reuses && !is_excluded;  // its lookup has not ended
+  const bool looks_up = study.reuses && !is_excluded;  // its lookup of results has not ended
   feed(StudyAdded{id, study.table, std::move(study.completed), study.failures.size(),
                   study.state == StudyState::kCancelled,
                   study.state == StudyState::kPaused || is_excluded, study.priority,
@@ -153,7 +153,7 @@ void Service::handle_worker_events(Instant now) {
 }
 
 void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
-  // Nothing is stored for a study without open points, so its table is not made.
+  // Without open points nothing is stored, so the inputs need no check and the table is not made.
   if (!states_.contains(event.study) || !scheduler_.has_study(event.study) ||
       scheduler_.study(event.study).open() == 0) {
     return;
@@ -184,7 +184,7 @@ void Service::store(const StoreResults& effect, protocol::Results& message, Inst
   WorkerRecord& worker = *workers_.find(effect.worker);
   const bool has_rows = !effect.accepted.empty() && states_.contains(effect.study);
   if (has_rows && !std::exchange(worker.has_row, true)) {
-    // A worker without results gets no row.
+    // The worker's row is stored with its first result.
     ledger_.write(worker.row);
   }
   AddResults change{effect.study,
@@ -229,7 +229,7 @@ void Service::write_results(AddResults change, ResultsStored event) {
 void Service::results_stored(const ResultsStored& event, Instant now) {
   const StudyId id = event.study;
   if (!states_.contains(id)) {
-    feed(event, now);  // the study was deleted, so the database dropped these
+    feed(event, now);  // the study was deleted, so the database has dropped these results
     return;
   }
   std::uint64_t solved = 0;

@@ -25,11 +25,11 @@ struct ServiceSettings : WorkerSessionSettings {
   ClientHandlerSettings clients;
   StudyBounds bounds;
   std::uint64_t last_study_id = 0;
-  /// Only points of this study are leased. Empty: of all.
+  /// Only points of this study are leased; empty: points of all studies.
   std::string only_study{};
 };
 
-/// Number of points that were stored since the service began.
+/// Number of points that were stored since the service started.
 struct StoredPoints {
   std::uint64_t solved = 0;
   std::uint64_t failed = 0;
@@ -39,44 +39,44 @@ struct StoredPoints {
 /// so tests drive it message by message. Not thread-safe.
 class Service {
  public:
-  /// `ports` must outlive the service. `studies` come from the database.
+  /// `ports` must outlive the service. `studies` were read from the database.
   Service(const ServiceSettings& settings, Ports& ports, std::vector<StoredStudy> studies,
           Instant now);
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
 
-  /// `holder`: the peer's key; null without keys.
+  /// `holder` is the peer's key; null without keys.
   void worker_frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::shared_ptr<const KeyIdentity>& holder = nullptr);
   void client_frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     clients_.frame(identity, frame, now, holder);
   }
-  /// The client has disconnected.
+  /// Handles a client's disconnection.
   void client_left(std::string_view identity) { clients_.client_left(identity); }
-  /// Logs at most 20 such lines in 10 s.
+  /// Logs a line about a peer that is not admitted; at most 20 such lines in 10 s.
   void log_stranger(const std::string& text) { peer_log_.write_of_stranger(text); }
   void written(const WriteReport& report, Instant now);
   void query_report(QueryReport report) { clients_.query_report(std::move(report)); }
-  /// To be called several times a second.
+  /// Must be called several times a second.
   void tick(Instant now);
   /// Stops sending batches and accepting studies; results are still stored.
   void drain(Instant now);
-  /// Whether no batch is leased and no write is pending.
+  /// Returns whether no batch is leased and no write is pending.
   bool is_drained() const { return scheduler_.leases() == 0 && ledger_.is_empty(); }
   /// Notifies workers and clients that the server stops. Results are still stored.
   void stop(Instant now);
 
-  /// Whether messages of workers should be read now. If not, no worker counts as silent.
+  /// Returns whether messages of workers should be read now. If not, no worker counts as silent.
   bool has_room() const { return ledger_.has_room(); }
-  /// Whether nothing more can be stored, so the server should end.
+  /// Returns whether nothing more can be stored, so that the server should end.
   bool storage_is_gone() const { return ledger_.is_gone(); }
   bool is_stopping() const { return stopping_ || draining_; }
 
   const Scheduler& scheduler() const { return scheduler_; }
   const StudyStates& states() const { return states_; }
   const WriteLedger& ledger() const { return ledger_; }
-  const PointRates& rates() const { return rates_; }  ///< of studies
+  const PointRates& rates() const { return rates_; }  ///< rates of studies
   QueryCounts query_counts() const { return clients_.query_counts(); }
   const StoredPoints& stored_points() const { return stored_points_; }
   std::uint64_t bad_frames() const { return peer_log_.bad_frames(); }
@@ -84,10 +84,10 @@ class Service {
   std::vector<protocol::WorkerStatus> worker_statuses(std::size_t most, Instant now) const;
 
  private:
-  /// Passes an event to the scheduler, carries out the effects, and passes on the events that these
+  /// Passes an event to the scheduler, carries out the effects, and repeats this for events they
   /// cause.
   void feed(const Event& event, Instant now);
-  /// `results`: the message behind a ResultsReceived.
+  /// `results` is the message from which a ResultsReceived was made.
   void handle(const Event& event, Instant now, protocol::Results* results = nullptr);
   void handle_worker_events(Instant now);
   void fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const;
@@ -112,7 +112,7 @@ class Service {
   StoredPoints stored_points_;
   bool stopping_ = false;
   bool draining_ = false;
-  bool holds_batches_ = false;  // the last DispatchHeld
+  bool holds_batches_ = false;  // value of the last DispatchHeld event
 };
 
 }  // namespace oblique::server

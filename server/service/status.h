@@ -15,12 +15,12 @@
 
 namespace oblique::server {
 
-/// Points per second over the last seconds, by study or worker.
+/// Completed points per second over the last 5 s, by study or worker.
 class PointRates {
  public:
   using Id = std::uint64_t;
 
-  /// Adds completed points. `since_ms`: the start of the first interval of this ID.
+  /// Adds completed points. `since_ms` is the start of the first interval of a new ID.
   void add(Id id, std::uint64_t points, std::int64_t since_ms, std::int64_t now_ms) {
     Recent& recent = recent_.try_emplace(id, Recent{since_ms}).first->second;
     if (recent.points.empty() || now_ms - recent.points.back().at_ms >= kResolution_ms) {
@@ -32,7 +32,7 @@ class PointRates {
     }
   }
   void forget(Id id) { recent_.erase(id); }
-  /// Removes IDs without recent points. To be called now and then.
+  /// Removes IDs without recent points. Must be called from time to time.
   void forget_old(std::int64_t now_ms) {
     std::erase_if(recent_, [now_ms](const auto& entry) {
       return now_ms - entry.second.points.back().at_ms >= kSpan_ms;
@@ -43,7 +43,7 @@ class PointRates {
     const auto found = recent_.find(id);
     return found == recent_.end() ? 0.0 : rate_of(found->second, now_ms);
   }
-  /// The sum over all IDs.
+  /// Returns the sum over all IDs.
   double points_per_s(std::int64_t now_ms) const {
     double sum = 0.0;
     for (const auto& [id, recent] : recent_) {
@@ -76,25 +76,25 @@ class PointRates {
   std::map<Id, Recent> recent_;
 };
 
-/// Parts of the service that its handlers share.
+/// Parts of the service that all of its handlers use.
 struct Core {
   Ports& ports;
   Scheduler& scheduler;
   StudyStates& states;
   WriteLedger& ledger;
   WorkerSessions& workers;
-  PointRates& rates;  ///< of studies
+  PointRates& rates;  ///< rates of studies
   PointRates& worker_rates;
-  std::string solver_version;  ///< of the server
+  std::string solver_version;  ///< solver version of the server
   /// Passes an event to the scheduler and carries out its effects.
   std::function<void(const Event&, Instant)> feed;
 };
 
-// Status of studies and workers as messages for clients and the page.
+// These functions return the status of studies and workers as messages for clients and the page.
 
 /// Throws std::out_of_range for a study that is not durable.
 protocol::StudyStatus study_status(StudyId id, const Core& core, Instant now);
-/// Empty if there is nothing to report.
+/// Returns an empty message if the study reuses no results.
 protocol::ReusedPoints reuse_status(const Reuse& reuse);
 protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now);
 

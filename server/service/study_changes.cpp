@@ -22,7 +22,7 @@ constexpr const char* kDeletedState = "deleted";
 std::string unknown_study(const std::string& name, const StudyStates& states) {
   const std::string nearest = states.nearest(name);
   const std::string shown = protocol::shortened(name, kLongestShownName);
-  if (!name.empty() && nearest == name) {  // the request also had a study number
+  if (!name.empty() && nearest == name) {  // the request also had a study number, which is wrong
     return fmt::format("study name \"{}\" and study number do not match: see `oblique studies`",
                        shown);
   }
@@ -34,7 +34,7 @@ std::string unknown_study(const std::string& name, const StudyStates& states) {
 
 ReadRequest read_request(std::string_view frame, bool validates_points) {
   ReadRequest read;
-  // A short frame cannot contain much padding.
+  // A short frame is not checked for padding, because it cannot contain much.
   read.is_readable =
       (frame.size() <= limits::kLongestInlineRequest || protocol::is_unpadded_request(frame)) &&
       protocol::decode(frame, read.request);
@@ -60,7 +60,7 @@ ReadRequest read_request(std::string_view frame, bool validates_points) {
 
 // ---- Writing -----------------------------------------------------------------------------------
 
-/// Writes the change. A refusal calls `on_refused` and is the reply to the client.
+/// Writes the change. If the database refuses it, calls `on_refused` and sends the client an error.
 void StudyChanges::write(const Client& client, StudyId id, Change change, OnStored on_stored,
                          std::function<void()> on_refused) {
   pending_[id];
@@ -95,8 +95,8 @@ void StudyChanges::write(const Client& client, StudyId id, Change change, OnStor
       });
 }
 
-/// Defers the request if a change of the study is being written; it is handled after that. Returns
-/// whether it was deferred or refused.
+/// If a change of the study is being written, stores `request` to be called afterwards, or refuses
+/// it. Returns whether it did so.
 bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(Instant)> request) {
   const auto pending = pending_.find(id);
   if (pending == pending_.end()) {
@@ -137,7 +137,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   try {
     growth = study.table.growth_to(read.table);
   } catch (const std::runtime_error&) {
-    // The stored recipe may be of another version.
+    // A recipe of another version may be unreadable.
   }
   if (growth.kind != Growth::Kind::kSame) {
     grow(client, *known, read, growth, priority, now);
@@ -177,8 +177,8 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
         on_stored, [this, id] { core_.states.remove(id); });
 }
 
-/// Handles a submitted recipe that differs from the stored one: appends its further points, or
-/// refuses it.
+/// Handles a submitted recipe that differs from the stored one: appends its new points or refuses
+/// it.
 void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& read,
                         const Growth& growth, std::int32_t priority, Instant now) {
   const StudyRecord& study = core_.states.record(id);
@@ -289,7 +289,7 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
   }
 }
 
-/// Replies at once if the study already has the state.
+/// Changes the state of a study. Replies at once if the study already has the state.
 void StudyChanges::change_state(const Client& client, StudyId id, StudyState wanted,
                                 const OnStored& reply, Instant now) {
   if (!core_.states.needs_write(id, wanted)) {
@@ -331,7 +331,7 @@ void StudyChanges::retry(const Client& client, StudyId id, Instant now) {
   }
   write(client, id, ForgetFailures{id, failures, iso_8601(now)},
         [this, client, id, failures](Instant then) {
-          core_.rates.forget(id);  // the number of completed points falls
+          core_.rates.forget(id);  // the number of completed points becomes smaller
           StudyRecord& study = core_.states.record(id);
           failures.for_each(
               [&](const Interval& gone) { study.failures.erase(gone.begin, gone.end); });
@@ -397,8 +397,7 @@ void StudyChanges::finish(StudyId id, Instant now) {
 
 // ---- Bounds and replies ------------------------------------------------------------------------
 
-/// Whether the limits allow this number of further studies and points. If not, the client gets an
-/// error.
+/// Returns whether the limits allow further studies and points. If not, the client gets an error.
 bool StudyChanges::may_open(const Client& client, std::uint64_t studies, std::uint64_t points) {
   const auto fits = [&](const char* what, std::uint64_t open, std::uint64_t more,
                         std::uint64_t most, const char* option = "") {
@@ -425,7 +424,7 @@ StudyChanges::OnStored StudyChanges::submitted_reply(const Client& client, Study
   return [this, client, id](Instant now) { reply_submitted(client, id, {}, now); };
 }
 
-/// Sends the reply when the lookup of reusable results has ended, or after a short wait.
+/// Sends the reply when the lookup of results has ended, at the latest after `kLongestWait_ms`.
 void StudyChanges::reply_submitted(const Client& client, StudyId id, protocol::SubmitReply reply,
                                    Instant now) {
   constexpr std::int64_t kLongestWait_ms = 1500;
@@ -466,7 +465,8 @@ void StudyChanges::reply_changed(const Client& client, const protocol::StudyStat
 
 // ---- Results of other studies ------------------------------------------------------------------
 
-/// Whether a study with results of that solver version (empty: without results) can reuse any.
+/// Returns whether a study can reuse results. `solver_version` made the results that it already
+/// has; empty if it has none.
 bool StudyChanges::should_look_up(const ReadRequest& read, std::string_view solver_version) const {
   return !read.request.submit().no_reuse() && core_.states.have_results() &&
          (solver_version.empty() || solver_version == core_.solver_version);
@@ -516,7 +516,7 @@ void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant no
   }
 }
 
-/// After an error the remaining points are solved.
+/// Handles a part of the lookup that failed. The remaining points will be solved.
 void StudyChanges::part_refused(StudyId id, const std::string& error) {
   if (core_.ledger.is_gone() || !core_.states.contains(id)) {
     return;

@@ -17,60 +17,60 @@ namespace oblique::server {
 
 /// A parsed request of a client and, for a submission, the table of its recipe.
 struct ReadRequest {
-  bool is_readable = false;             ///< if false, only the number is valid
-  std::uint64_t request_id = 0;         ///< 0: it cannot be read
-  protocol::ClientRequest request;      ///< without the recipe, which is in the table
+  bool is_readable = false;             ///< if false, only the request number is valid
+  std::uint64_t request_id = 0;         ///< 0 if it cannot be read
+  protocol::ClientRequest request;      ///< has no recipe, because that is in `table`
   StudyTable table;                     ///< set if the recipe is valid
-  std::string recipe_error;             ///< why the recipe is invalid; empty: it is valid
-  bool needs_point_validation = false;  ///< the points of the recipe must still be validated
+  std::string recipe_error;             ///< why the recipe is invalid; empty if it is valid
+  bool needs_point_validation = false;  ///< true if its points must still be validated
 };
 
-/// Parses one frame. Time and memory are proportional to its size: a long frame that is padded with
-/// empty messages is not parsed. With `validates_points` also calls PointTable::validate_points,
-/// which may take a second.
+/// Parses one frame, in time and memory proportional to its size: a long frame that is padded with
+/// empty messages is refused. If `validates_points`, also calls PointTable::validate_points, which
+/// may take a second.
 ReadRequest read_request(std::string_view frame, bool validates_points = true);
 
-/// Limits on studies that are neither done nor cancelled, and on their points.
+/// Limits on the number of studies that are neither done nor cancelled, and of their points.
 struct StudyBounds {
   std::uint64_t studies = limits::kOpenStudies;
   std::uint64_t points = limits::kOpenPoints;
 };
 
-/// Requests that change a study: submit, grow, pause, resume, cancel, retry, rename, delete. A
-/// change takes effect, and the client gets its reply, when it is durable. Meanwhile later requests
-/// for that study wait. Not thread-safe.
+/// Handles requests that change a study: submit, grow, pause, resume, cancel, retry, rename,
+/// delete. When a change is durable it takes effect and the client gets its reply. Until then later
+/// requests for that study wait. Not thread-safe.
 class StudyChanges {
  public:
-  /// `last_study_id` is the highest number in the database.
+  /// `last_study_id` is the highest study number in the database.
   StudyChanges(std::uint64_t last_study_id, const StudyBounds& bounds, const Core& core)
       : last_study_id_(last_study_id), bounds_(bounds), core_(core) {}
 
   /// Handles a submission with a valid recipe.
   void submit(const Client& client, const ReadRequest& read, Instant now);
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
-  /// All points that the study had before a pending growth are completed.
+  /// Sets a study to done, because all its points are completed. While it grows, only records this.
   void finish(StudyId id, Instant now);
-  /// Sends replies to submissions whose lookup of reusable results has ended, takes long, or whose
-  /// study is gone.
+  /// Sends pending replies to submissions if the lookup of reusable results has ended or takes
+  /// long, or the study is gone.
   void release_replies(Instant now);
 
-  /// A lookup ends early after this number of probes, or this time, without a result.
+  /// A lookup ends early after this number of probes, or after this time, without a result.
   static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
   /// Looks up results of other studies for all open points, in parts. The scheduler must hold the
-  /// study. If the study is cancelled, the lookup ends with the part that is being written.
+  /// study meanwhile. If the study is cancelled, the lookup ends after its current part.
   void look_up(StudyId id, Instant now);
-  /// Stops all lookups after their current part; the next server continues them.
+  /// Stops all lookups after their current part. The next server continues them.
   void stop_lookups() { lookups_stop_ = true; }
 
  private:
   /// A change of a study that is being written.
   struct Pending {
-    bool grows = false;        ///< it adds points
-    bool is_complete = false;  ///< all earlier points were completed meanwhile
+    bool grows = false;        ///< true if it adds points
+    bool is_complete = false;  ///< true if all earlier points have been completed
     std::vector<std::function<void(Instant)>> deferred{};  ///< later requests for the study
   };
-  /// A reply to a submission that waits for the lookup of results.
+  /// A reply to a submission, which waits for the lookup of reusable results.
   struct HeldReply {
     StudyId study;
     Client client;
@@ -115,7 +115,7 @@ class StudyChanges {
   bool lookups_stop_ = false;
 };
 
-/// The error message for an unknown study.
+/// Returns the error message for an unknown study.
 std::string unknown_study(const std::string& name, const StudyStates& states);
 
 }  // namespace oblique::server

@@ -24,10 +24,10 @@ struct Reuse {
     std::int64_t last_result_ms;
     std::uint64_t probes_in_vain = 0;
   };
-  std::map<std::string, std::uint64_t> origins{};  ///< number of points by source study
+  std::map<std::string, std::uint64_t> origins{};  ///< number of reused points, by source study
   std::uint64_t points = 0;
   bool cut_short = false;
-  std::optional<Lookup> lookup{};  ///< set while the lookup runs
+  std::optional<Lookup> lookup{};  ///< has a value while the lookup runs
 
   void add(const std::map<std::string, std::uint64_t>& more) {
     for (const auto& [origin, number] : more) {
@@ -37,68 +37,68 @@ struct Reuse {
   }
 };
 
-/// A study, without the states of its points, which the scheduler has.
+/// A study. The scheduler stores the states of its points.
 struct StudyRecord {
   std::string name;
   StudyTable table;
   std::string created_at;
   std::int32_t priority = 0;
-  IntervalSet failures{};      ///< points with a failed row
-  std::int64_t since_ms{};     ///< time from which its rate is computed
+  IntervalSet failures{};      ///< points whose row has an error
+  std::int64_t since_ms{};     ///< start of the time over which its rate is computed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
   Reuse reuse{};
   StudyState state = StudyState::kRunning;
   bool is_durable = false;
-  /// A write was refused, but the disk may have stored part of it, which would count after a crash.
+  /// True if a write was refused. The disk may have stored a part, which would count after a crash.
   bool is_doubtful = false;
 };
 
 /// The studies by number and name, as in the database. A study that is being added has a name but
-/// is not durable. Functions throw std::out_of_range for unknown studies unless stated otherwise.
+/// is not durable yet. Functions throw std::out_of_range for unknown studies unless stated
+/// otherwise.
 class StudyStates {
  public:
-  /// Adds a study from the database. A study that is marked done but lacks rows runs again.
+  /// Adds a study from the database. A study that is marked done but lacks rows becomes running.
   void restore(const StoredStudy& study, std::int64_t now_ms);
-  /// Adds a running study that is being written, with an unused number and name.
+  /// Adds a running study with an unused number and name, while it is being written.
   void add(StudyId id, StudyRecord record);
   void remove(StudyId id);
 
-  /// The study of that name, durable or being added.
+  /// Returns the study with that name, durable or being added.
   std::optional<StudyId> find(std::string_view name) const;
-  /// The durable study of that number or, if that is 0, of that name.
+  /// Returns the durable study with number `id` or, if `id` is 0, with that name.
   std::optional<StudyId> find_durable(std::string_view name, StudyId id = 0) const;
-  /// The nearest name; empty if none is near or there are too many studies.
+  /// Returns the nearest name; empty if none is near or there are too many studies.
   std::string nearest(std::string_view name) const;
-  /// The durable study with the lowest number above this one.
+  /// Returns the durable study with the lowest number above `id`.
   std::optional<StudyId> durable_after(StudyId id) const;
   bool contains(StudyId id) const { return studies_.contains(id); }
   const StudyRecord& record(StudyId id) const { return studies_.at(id); }
-  /// For changes except of name and state, which have functions of their own.
+  /// Returns the record for changes of anything but name and state, which have their own functions.
   StudyRecord& record(StudyId id) { return studies_.at(id); }
-  /// Whether it is neither done nor cancelled.
+  /// Returns whether the study is neither done nor cancelled.
   bool is_open(StudyId id) const { return unfinished_.contains(id); }
 
-  /// Number of studies by StudyState.
+  /// Returns the number of studies in each StudyState.
   std::array<std::uint64_t, kStudyStates> counts() const;
-  /// Numbers of the open studies.
+  /// Returns the numbers of the open studies.
   const std::set<StudyId>& unfinished() const { return unfinished_; }
-  /// Number of points of the open studies.
+  /// Returns the number of points of all open studies.
   std::uint64_t open_points() const;
-  /// Whether some study has, or had, results that others can reuse.
+  /// Returns whether any study has, or once had, results that others can reuse.
   bool have_results() const { return have_results_; }
   void note_results() { have_results_ = true; }
 
-  /// Whether the state must be written: the study has another state or a doubtful one, and is not
+  /// Returns whether a state must be written: it differs or `is_doubtful`, and the study is not
   /// done.
   bool needs_write(StudyId id, StudyState wanted) const;
-  /// Sets a state that is durable. A done study keeps its state until some of its points are open
-  /// again.
+  /// Sets a state that is durable. A done study stays done until `reopen`.
   void set_state(StudyId id, StudyState state);
   void reopen(StudyId id) { move(id, StudyState::kRunning); }
-  /// Sets the state to done. False if it was done.
+  /// Sets the state to done. Returns false if it was done already.
   bool finish(StudyId id);
 
-  /// Reserves an unused name until `release` or `rename`.
+  /// Reserves an unused name for a study until `release` or `rename`.
   void reserve(StudyId id, const std::string& name) { ids_.emplace(name, id); }
   void release(const std::string& name) { ids_.erase(name); }
   void rename(StudyId id, const std::string& name);

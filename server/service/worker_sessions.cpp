@@ -19,7 +19,7 @@ namespace {
 constexpr std::size_t kLongestWorkerText = 256;
 constexpr std::uint32_t kMaxThreads = 4096;
 
-/// Escapes and shortens a text from a peer, for logs and tables.
+/// Shortens a text from a peer and replaces its control characters, for logs and tables.
 std::string plain(const std::string& text) {
   std::string kept = protocol::shortened(text, kLongestWorkerText);
   std::replace_if(
@@ -28,7 +28,7 @@ std::string plain(const std::string& text) {
   return kept;
 }
 
-/// The left-out points in a message; nothing if its ranges are invalid.
+/// Returns the left-out points in a message; nothing if its ranges are invalid.
 std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   IntervalSet points;
   if (message.left_out_size() % 2 != 0 ||
@@ -46,7 +46,7 @@ std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   return points;
 }
 
-/// A recipe of one point that is solved quickly.
+/// Returns a recipe with one point that is solved quickly.
 protocol::Recipe probe_recipe() {
   protocol::Recipe recipe;
   *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
@@ -68,7 +68,8 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
   WorkerInput input;
   const auto known = ids_.find(identity);
   protocol::WorkerMessage message;
-  const bool is_small = protocol::is_worker_frame_within_limits(frame);  // checked before parsing
+  // the size is checked before parsing
+  const bool is_small = protocol::is_worker_frame_within_limits(frame);
   const bool is_read = is_small && protocol::decode(frame, message);
   const int lease_count =
       message.heartbeat().lease_ids_size() + message.give_back().lease_ids_size();
@@ -119,7 +120,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       break;
     }
     case Kind::kTrace:
-      input.events.emplace_back(CreditGiven{worker, 0});  // a sign of life
+      input.events.emplace_back(CreditGiven{worker, 0});  // counts as a sign of life
       input.trace_of = worker;
       input.trace = std::move(*message.mutable_trace());
       break;
@@ -138,11 +139,11 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
 void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHello& hello,
                            Instant now, const std::string& key, WorkerInput& input) {
   if (ledger_.is_gone() || !ledger_.has_room()) {
-    return;  // the worker will repeat it
+    return;  // the worker will send it again
   }
   if (const auto known = ids_.find(identity); known != ids_.end()) {
     const WorkerId old = known->second;
-    forget(old);  // the session starts again, and its leases end
+    forget(old);  // a second WorkerHello begins a new session, so all leases end
     input.events.emplace_back(WorkerLeft{old});
   }
   protocol::ServerToWorker reply;
@@ -193,7 +194,7 @@ std::string WorkerSessions::refusal_reason(const protocol::WorkerHello& hello) c
 
 void WorkerSessions::results(WorkerId worker, protocol::Results message, WorkerInput& input) {
   if (ledger_.is_gone()) {
-    return;  // the worker keeps results that are not acknowledged
+    return;  // the worker keeps all results that are not acknowledged
   }
   std::optional<IntervalSet> left_out = left_out_of(message);
   if (!left_out) {
@@ -254,12 +255,13 @@ void WorkerSessions::tick(const Silence& silent_ms, Instant now) {
     }
     const bool is_silent = silent_ms(id) > late_ms;
     if (is_silent || now.steady_ms - worker.last_sent_ms > late_ms) {
-      // Sending detects at once that the connection of a killed process is gone. It is also a sign
-      // of life for workers whose messages wait here.
+      // Sending detects at once whether the connection of a killed process is gone. The message is
+      // also a sign of life for workers whose own messages wait to be read.
       send(id, sign);
     }
     if (is_silent && (!ledger_.has_room() || ports_.has_unread_input(worker.identity))) {
-      events_.emplace_back(CreditGiven{id, 0});  // not silent, because its messages are not read
+      // the worker is not silent; its messages were not read
+      events_.emplace_back(CreditGiven{id, 0});
     }
     if (worker.is_busy && !ports_.is_busy(worker.identity)) {
       worker.is_busy = false;
@@ -356,7 +358,7 @@ void WorkerSessions::send_stopping(WorkerId worker) {
   send(worker, message);
 }
 
-/// `lease`: that of a batch in the frame; 0: none. A worker that is gone or busy causes an event.
+/// `lease` is the lease of the batch in the frame; 0: none. A gone or busy worker causes an event.
 void WorkerSessions::send_frame(WorkerId worker, const std::string& frame, LeaseId lease) {
   const auto known = workers_.find(worker);
   if (known == workers_.end()) {

@@ -21,25 +21,25 @@ struct WorkerSessionSettings {
   std::uint32_t heartbeat_interval_ms = 900;
   std::string solver_version;  ///< workers with another version are refused
   std::string database_id;
-  std::uint64_t last_worker_id = 0;  ///< highest number in the database
+  std::uint64_t last_worker_id = 0;  ///< highest worker number in the database
 };
 
 /// A connected worker, from its WorkerHello.
 struct WorkerRecord {
   std::string identity;
-  AddWorker row;                  ///< its row, stored with its first result
+  AddWorker row;                  ///< the worker's row, stored with its first result
   std::string key;                ///< name of its key; empty without keys
   std::string host;               ///< name of its machine
-  std::int64_t last_sent_ms = 0;  ///< time of the last message to it, up to one tick late
-  bool was_sent = false;          ///< a message was sent since the last tick
-  bool is_busy = false;           ///< the last WorkerBusy event
-  bool has_row = false;           ///< whether the database has a row for it
+  std::int64_t last_sent_ms = 0;  ///< time of the last message to it; up to one tick too late
+  bool was_sent = false;          ///< true if a message was sent since the last tick
+  bool is_busy = false;           ///< value of the last WorkerBusy event
+  bool has_row = false;           ///< true if the database has a row for it
 };
 
-/// Content of a worker's frame.
+/// The content of a worker's frame.
 struct WorkerInput {
   std::vector<Event> events;  ///< events for the scheduler, in order
-  protocol::Results results;  ///< the message behind a ResultsReceived
+  protocol::Results results;  ///< the message from which a ResultsReceived was made
   WorkerId trace_of = 0;      ///< worker that sent `trace`; 0: none
   protocol::Trace trace;
 };
@@ -48,7 +48,7 @@ struct WorkerInput {
 /// Refuses messages that correct workers never send. Frames may be malicious. Not thread-safe.
 class WorkerSessions {
  public:
-  /// `lost_after_ms` must equal the scheduler's.
+  /// `lost_after_ms` must equal the scheduler's value.
   WorkerSessions(WorkerSessionSettings settings, std::int64_t lost_after_ms, Ports& ports,
                  PeerLog& log, const WriteLedger& ledger)
       : settings_(std::move(settings)),
@@ -57,38 +57,37 @@ class WorkerSessions {
         log_(log),
         ledger_(ledger) {}
 
-  /// `key`: name of the worker's key; empty without keys.
+  /// `key` is the name of the worker's key; empty without keys.
   WorkerInput frame(const std::string& identity, std::string_view frame, Instant now,
                     const std::string& key = {});
 
-  // Messages to workers; workers that are gone are ignored.
+  // Send messages to workers. Workers that have disconnected are ignored.
   void send(const SendBatch& batch);
   void send(const SendProbe& probe);
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
-  /// `lease`: that of a batch in the message; 0: none.
+  /// `lease` is the lease of the batch in the message; 0: it has none.
   void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0) {
     send_frame(worker, protocol::encode(message), lease);
   }
-  /// Sends the stored bytes of the recipe, because encoding a long recipe for each worker takes
-  /// long.
+  /// Sends the stored bytes of the recipe, because encoding a long recipe for each worker is slow.
   void define(const DefineStudy& define, const std::string& recipe_bytes);
   void notify_all(const std::string& text);
-  /// Notifies all workers, and those that join later, that the server stops.
+  /// Notifies all workers that the server stops, and also workers that join later.
   void stop();
 
   void drop(const DropWorker& drop);
 
-  /// Time since the last message of a worker, in ms.
+  /// Returns the time since a worker's last message [ms].
   using Silence = std::function<std::int64_t(WorkerId)>;
-  /// Sends a HeartbeatReply to workers whose heartbeat is late, and to those that got no message
-  /// for as long. To be called several times a second.
+  /// Sends a HeartbeatReply to workers whose heartbeat is late, and to workers to which
+  /// nothing was sent in that time. Must be called several times a second.
   void tick(const Silence& silent_ms, Instant now);
-  /// Events that occurred while messages were sent: unreachable or busy workers.
+  /// Returns events that occurred while messages were sent: unreachable or busy workers.
   std::vector<Event> take_events();
 
-  /// Null for an unknown worker.
+  /// Returns null for an unknown worker.
   WorkerRecord* find(WorkerId worker);
   const std::map<WorkerId, WorkerRecord>& all() const { return workers_; }
 

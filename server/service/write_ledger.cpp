@@ -34,7 +34,7 @@ void WriteLedger::end(std::uint64_t ticket, const std::optional<std::string>& er
 void WriteLedger::abandon(const std::string& error, Instant now) {
   fault_ = error;
   is_gone_ = true;
-  while (!writes_.empty()) {  // a refusal may start further writes
+  while (!writes_.empty()) {  // handling a refusal may add further writes
     end(writes_.begin()->first, error, now);
   }
 }

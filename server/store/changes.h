@@ -20,7 +20,7 @@ namespace oblique::server {
 enum class StudyState { kRunning, kPaused, kCancelled, kDone };
 inline constexpr std::size_t kStudyStates = 4;
 
-/// The text in the column `studies.state`.
+/// Returns the text for the column `studies.state`.
 constexpr const char* state_name(StudyState state) {
   switch (state) {
     case StudyState::kRunning:
@@ -36,7 +36,7 @@ constexpr const char* state_name(StudyState state) {
 }
 
 // Changes to the database. Times are UTC in ISO 8601. A change with `kNeedsFullSync` must survive a
-// power failure; results need not, because they can be solved again.
+// power failure. Other changes may be lost then, because they can be made again.
 
 struct AddStudy {
   static constexpr bool kNeedsFullSync = true;
@@ -46,7 +46,7 @@ struct AddStudy {
   std::string created_at;
   std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the submitter's key; empty without keys
-  bool reuses = false;            ///< results of other studies are looked up
+  bool reuses = false;            ///< true if results of other studies are looked up
 };
 
 struct SetPriority {
@@ -55,7 +55,7 @@ struct SetPriority {
   std::int32_t priority = 0;
 };
 
-/// Deletes the rows of those of these points that failed. A done study runs again.
+/// Deletes the rows of failed points among these points. A done study runs again.
 struct ForgetFailures {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
@@ -72,7 +72,7 @@ struct SetStudyState {
 
 struct AddWorker {
   static constexpr bool kNeedsFullSync = false;
-  static constexpr std::uint64_t study_id = 0;  ///< belongs to no study
+  static constexpr std::uint64_t study_id = 0;  ///< a worker belongs to no study
   std::uint64_t worker_id;
   std::string name;
   std::uint32_t threads;
@@ -81,43 +81,43 @@ struct AddWorker {
   std::string joined_at;
 };
 
-/// Adds results of one study. A point that already has a row keeps it.
+/// Adds results of one study. If a point already has a row, its new result is ignored.
 struct AddResults {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
-  std::uint64_t worker_id;  ///< 0: the server failed the points
+  std::uint64_t worker_id;  ///< 0 if the server itself failed the points
   std::string solver_version;
   std::string instruction_set;
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  IntervalSet left_out{};         ///< left-out points, which are completed without a row
-  std::size_t message_bytes = 0;  ///< size of the worker's message
+  IntervalSet left_out{};         ///< points completed without a row
+  std::size_t message_bytes = 0;  ///< size of the worker's message [bytes]
 };
 
-/// Appends points to a study, which then runs with this priority.
+/// Appends points to a study. The study then runs with the given priority.
 struct GrowStudy {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
-  StudyTable table;  ///< all points, including the earlier ones
+  StudyTable table;  ///< contains all points, also the earlier ones
   std::int32_t priority = 0;
   std::string changed_at;
-  bool reuses = false;  ///< as in AddStudy
+  bool reuses = false;  ///< true if results of other studies are looked up
 };
 
-/// Outcome of a ReuseResults, valid when the change is durable.
+/// Outcome of a ReuseResults. It is valid when that change is durable.
 struct ReusedResults {
   IntervalSet points;                              ///< points that got a row
-  std::map<std::string, std::uint64_t> origins{};  ///< number of copies by source study
+  std::map<std::string, std::uint64_t> origins{};  ///< number of copied rows, by source study
   std::uint64_t probes = 0;                        ///< number of lookups
-  /// first point of the next part; none: the lookup is complete
+  /// first point of the next part; nothing if the lookup is complete
   std::optional<std::uint64_t> next_point = {};
 };
 
-/// Looks up one part of the study's open points, from `first_point` on, among solved points of
-/// other studies, and copies the rows that it finds. Copies only rows of `solver_version`, and only
-/// if both studies request estimated errors or neither does.
+/// Looks up one part of the study's open points, from `first_point` on, in the results of other
+/// studies, and copies the rows that it finds. Copies only rows of `solver_version`, and only if
+/// both studies request estimated errors or neither does.
 struct ReuseResults {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
@@ -127,7 +127,7 @@ struct ReuseResults {
   std::shared_ptr<ReusedResults> outcome;  ///< set when the change is written
 };
 
-/// Ends the lookup of results for a study.
+/// Records that the lookup of results for a study has ended.
 struct EndReuse {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
@@ -139,8 +139,8 @@ struct RenameStudy {
   std::string name;
 };
 
-/// Deletes a study: frees its name and drops later results. `Storage::clear_away` deletes its rows
-/// in parts.
+/// Deletes a study: frees its name and makes the database drop its late results.
+/// `Storage::clear_away` later deletes its rows in parts.
 struct DeleteStudy {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
@@ -154,7 +154,7 @@ inline std::uint64_t study_of(const Change& change) {
   return std::visit([](const auto& kind) { return kind.study_id; }, change);
 }
 
-/// Size of the message or recipe in a change; 0 if it has none.
+/// Returns the size of the message or recipe in a change [bytes]; 0 if it has none.
 inline std::size_t bytes_of(const Change& change) {
   return std::visit(
       [](const auto& kind) -> std::size_t {
@@ -173,11 +173,11 @@ inline bool needs_full_sync(const Change& change) {
   return std::visit([](const auto& kind) { return kind.kNeedsFullSync; }, change);
 }
 
-/// Outcome of one step of deleting the rows of deleted studies.
+/// Outcome of one step that deletes rows of deleted studies.
 enum class ClearedAway {
-  kAll,   ///< no such rows are left
+  kAll,   ///< no rows of deleted studies are left
   kPart,  ///< more rows may be left
-  /// nothing was deleted, because readers keep the write-ahead log long; try again later
+  /// no row was deleted, because readers keep the write-ahead log long; try again later
   kMustWait,
 };
 
@@ -186,21 +186,23 @@ class Storage {
  public:
   virtual ~Storage() = default;
 
-  /// Writes all changes, in order, in one durable transaction. Throws StorageError if none was
-  /// stored, and StorageGone if that is unknown, so that nothing can be stored any more.
+  /// Writes all changes, in order, in one durable transaction. Throws StorageError if no change was
+  /// stored. Throws StorageGone if it is unknown whether they were stored; nothing can be stored
+  /// after that.
   virtual void commit(std::span<const Change> changes) = 0;
 
   /// Throws StorageGone if the file at the database's path was deleted or replaced.
   virtual void check() {}
 
-  /// Deletes at most `most` rows of deleted studies in one transaction. Throws as `commit` does.
+  /// Deletes at most `most` rows of deleted studies in one transaction. Throws `commit`'s errors.
   virtual ClearedAway clear_away(std::size_t /*most*/) { return ClearedAway::kAll; }
 
   /// Moves the write-ahead log into the database and empties it, so that one file contains
-  /// everything. False if a reader prevents it. Throws StorageError.
+  /// everything. Returns false if a reader prevents that. Throws StorageError.
   virtual bool merge_log() { return true; }
 
-  /// Makes the current statement, and every later long one, fail with a StorageError. Thread-safe.
+  /// Makes the running statement, and every later statement that takes long, fail with a
+  /// StorageError. Thread-safe.
   virtual void interrupt() {}
 };
 

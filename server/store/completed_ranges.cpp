@@ -25,7 +25,7 @@ IntervalSet completed_points(sqlite3* database, std::uint64_t study_id) {
 }
 
 void count_completed_points(sqlite3* database) {
-  // Consecutive points have the same difference between point and row number.
+  // In a run of consecutive points, the point minus the row number is constant.
   execute(database, R"sql(
     DELETE FROM completed_ranges WHERE study_id IN (SELECT study_id FROM studies WHERE NOT counted);
     INSERT INTO completed_ranges (study_id, first_point, points)
@@ -46,7 +46,8 @@ void update_counts_and_state(sqlite3* database, std::uint64_t study_id) {
        {"UPDATE main.studies SET left_out = " + completed +
             " - (SELECT count(*) FROM main.results WHERE study_id = ?1) WHERE study_id = ?1",
         std::string("DELETE FROM main.reused_points WHERE study_id = ?1"),
-        // The name of a study in `reused_from` (STUDY/POINT) may contain slashes.
+        // Removes "/POINT" from `reused_from`, which is STUDY/POINT; the study's name may contain
+        // slashes.
         std::string("INSERT INTO main.reused_points (study_id, source, points) SELECT ?1,"
                     " substr(reused_from, 1, length(rtrim(reused_from, '0123456789')) - 1) AS src,"
                     " count(*) FROM main.results WHERE study_id = ?1 AND reused_from IS NOT NULL"
@@ -81,7 +82,7 @@ std::optional<Interval> CompletedRanges::range_before(std::uint64_t study_id, st
   return range;
 }
 
-/// Deletes the ranges that begin in [first, last]. Returns the end of the last one, or 0.
+/// Deletes the ranges that begin in [first, last]. Returns the largest deleted end, or 0.
 std::uint64_t CompletedRanges::take_out(std::uint64_t study_id, std::uint64_t first,
                                         std::uint64_t last) {
   std::uint64_t end = 0;

@@ -12,40 +12,41 @@ namespace oblique::server {
 /// Reads the completed points of a study. Throws StorageError.
 IntervalSet completed_points(sqlite3* database, std::uint64_t study_id);
 
-/// Recomputes the completed points of each study with `counted` = 0 as the points with a row.
-/// Left-out points become open and a worker examines them again. To be called in a transaction.
+/// Recomputes the completed points of each study with `counted` = 0 as the points that have a row.
+/// Left-out points become open, and a worker examines them again. Must be called in a transaction.
 /// Throws StorageError.
 void count_completed_points(sqlite3* database);
 
 /// Computes `left_out` and `reused_points` of a study from its rows and completed ranges. Sets its
-/// state to done if all points are completed, and from done to running otherwise. Throws
+/// state to done if all points are completed; sets a done study to running otherwise. Throws
 /// StorageError.
 void update_counts_and_state(sqlite3* database, std::uint64_t study_id);
 
 /// Maintains the table `completed_ranges`, which contains the completed points of each study as
-/// ranges, so that a start need not read all rows. Each transaction that inserts or deletes rows
-/// must update it. If another program deletes rows, a trigger sets `studies.counted` to 0.
+/// ranges, so that a server need not read all rows at its start. Each transaction that inserts or
+/// deletes rows must update it. If another program deletes rows, a trigger sets `studies.counted`
+/// to 0.
 ///
-/// Writing a range takes three statements, whatever its length. Adjacent ranges are merged.
+/// Writing a range takes three statements, however long it is. Adjacent ranges are merged.
 ///
-/// The connection must outlive this. All members throw StorageError.
+/// The connection must outlive this object. All members throw StorageError.
 class CompletedRanges {
  public:
   explicit CompletedRanges(sqlite3* database);
 
-  /// Adds completed points; `flush` writes them.
+  /// Adds completed points, which `flush` will write.
   void add(std::uint64_t study_id, const Interval& points) {
     gathered_[study_id].insert(points.begin, points.end);
   }
   void add(std::uint64_t study_id, std::uint64_t point) { add(study_id, {point, point + 1}); }
   /// Writes the added points.
   void flush();
-  /// Drops the added points after a rollback.
+  /// Forgets the added points, because the transaction was rolled back.
   void forget() { gathered_.clear(); }
 
-  /// The stored ranges of a study that overlap `points`, uncut.
+  /// Returns the stored ranges that overlap `points`. They may begin before it or end after it.
   IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
-  /// The points in `points` that are neither completed nor added.
+  /// Returns the points in `points` that are neither completed nor added.
   IntervalSet open_points(std::uint64_t study_id, const IntervalSet& points);
   /// Removes completed points.
   void remove(std::uint64_t study_id, const IntervalSet& points);

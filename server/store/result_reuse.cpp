@@ -1,5 +1,5 @@
-// Looks up open points of a study among the solved points of other studies, by the index
-// `solved_points`, and copies the rows that it finds.
+// Looks up open points of a study in the results of other studies, by the index `solved_points`,
+// and copies the rows that it finds.
 #include <algorithm>
 #include <string>
 #include <string_view>
@@ -14,11 +14,11 @@
 namespace oblique::server {
 namespace {
 
-/// Maximum number of points and of lookups in one change: about 50 ms if all have a result.
+/// Maximum number of points, and of lookups, in one change: about 50 ms if all have a result.
 constexpr std::uint64_t kPart = 4096;
 
-/// Selects the first solved row of another study with these inputs and a correct checksum, and the
-/// name of that study.
+/// Selects the first row of another study that has these inputs, is solved and has a correct
+/// checksum, and the name of that study.
 std::string find_sql() {
   return fmt::format(
       "SELECT r.study_id, r.point, s.name FROM results AS r INDEXED BY solved_points"
@@ -29,7 +29,7 @@ std::string find_sql() {
       fmt::join(result_columns(), ", r."));
 }
 
-/// Copies a row, with study ?1, point ?2 and `reused_from` ?3.
+/// Copies a row for study ?1 and point ?2, with ?3 as `reused_from`.
 std::string copy_sql() {
   std::vector<std::string> copied;
   for (const std::string_view column : result_columns()) {
@@ -53,7 +53,7 @@ class Lookup {
         find_(database, find_sql()),
         copy_(database, copy_sql()) {}
 
-  /// Looks up the open points in [first, last). Returns where it ended.
+  /// Looks up the open points in [first, last). Returns the point before which it stopped.
   std::uint64_t run(std::uint64_t first, std::uint64_t last, const IntervalSet& completed) {
     const protocol::PointTable& table = *change_.table;
     std::uint64_t& probes = change_.outcome->probes;
@@ -62,7 +62,7 @@ class Lookup {
       const protocol::Segment segment = table.segment_at(point);
       const std::uint64_t segment_end = segment.first_point + segment.count;
       const std::int64_t model_id = stored_model(segment.model);
-      if (model_id == 0) {  // the model has no rows
+      if (model_id == 0) {  // no study has results of this model
         ++probes;
         point = segment_end;
         continue;
@@ -112,7 +112,7 @@ class Lookup {
   ModelRows& models_;
   Statement find_;
   Statement copy_;
-  // row of `models` by model number; 0: none
+  // number of the row of `models` by model number of the recipe; 0: none
   std::unordered_map<std::uint64_t, std::int64_t> model_ids_;
 };
 
@@ -120,7 +120,7 @@ class Lookup {
 
 void Store::add(const ReuseResults& change) {
   ReusedResults& outcome = *change.outcome;
-  outcome = {};  // an earlier attempt may have failed
+  outcome = {};  // removes the outcome of an earlier attempt that failed
   if (!has_study(change.study_id)) {
     return;
   }

@@ -60,14 +60,14 @@ const Columns& columns() {
 
 void append(std::string& text, double value) {
   constexpr int kDigits = 8;
-  std::array<char, 32> digits;  // the longest number is -1.2345678e-308
+  std::array<char, 32> digits;  // enough for the longest number, such as -1.2345678e-308
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
                                  std::chars_format::general, kDigits)
                        .ptr;
   text.append(digits.data(), end);
 }
 
-/// Appends a JSON array that contains an array of numbers for each element of the list.
+/// Writes the list as a JSON array that contains one array of numbers per element.
 template <class List, class Numbers>
 void write_json(std::string& text, const List& list, const Numbers& numbers_of) {
   text = "[";
@@ -82,8 +82,8 @@ void write_json(std::string& text, const List& list, const Numbers& numbers_of) 
   text += ']';
 }
 
-/// An INSERT statement with a parameter for each column, which also computes the checksum. It does
-/// nothing if a row with this key exists.
+/// Returns an INSERT statement that has a parameter for each column and computes the checksum. The
+/// statement does nothing if a row with this key exists.
 std::string insert_sql(std::string_view table, std::span<const std::string_view> columns,
                        std::string_view key) {
   std::string marks;
@@ -130,7 +130,7 @@ std::string model_checksum_sql() {
 }
 
 ResultInsert::ResultInsert(sqlite3* database)
-    // A point that has a row keeps it; other conflicts are errors.
+    // The statement does nothing for a point that has a row. Other conflicts are errors.
     : insert_(database, insert_sql("results", result_columns(), "study_id, point")) {}
 
 void ResultInsert::run(const AddResults& change, const protocol::PointResult& result,
@@ -154,7 +154,7 @@ void ResultInsert::run(const AddResults& change, const protocol::PointResult& re
   }
   put(change.attempt);
   put(change.solved_at);
-  insert_.run();  // unbound parameters are NULL
+  insert_.run();  // parameters that were not bound are NULL
 }
 
 void ResultInsert::put_outputs(const solver::CaseResult& result) {

@@ -16,16 +16,16 @@
 // Rows of the tables `results` and `models`.
 namespace oblique::server {
 
-/// The columns of `results`, except `status`, which SQLite computes, and `checksum`.
+/// Returns the columns of `results`, except `status`, which SQLite computes, and `checksum`.
 std::span<const std::string_view> result_columns();
-/// The columns with outputs of the solver, which are NULL in a failed row.
+/// Returns the columns with outputs of the solver. They are NULL in the row of a failed point.
 std::span<const std::string_view> output_columns();
-/// The outputs that every solved row must have.
+/// Returns the outputs that the row of every solved point must have.
 std::span<const std::string_view> required_outputs();
-/// The columns of `models`, except number and checksum.
+/// Returns the columns of `models`, except model_id and checksum.
 std::span<const std::string_view> model_columns();
 
-/// SQL expressions for the checksum of a row, over the columns of its table.
+/// Return SQL expressions that compute the checksum of a row from the other columns of its table.
 std::string result_checksum_sql();
 std::string model_checksum_sql();
 inline constexpr const char* kStudyChecksum =
@@ -34,11 +34,11 @@ inline constexpr const char* kStudyChecksum =
 /// Inserts rows with checksums into `results`.
 class ResultInsert {
  public:
-  /// The connection must outlive this.
+  /// The connection must outlive this object.
   explicit ResultInsert(sqlite3* database);
 
-  /// Inserts a result of `change`, solved with `inputs`, unless its point has a row. Throws
-  /// StorageError, also for a row that violates a constraint of the table.
+  /// Inserts the row of a result in `change`, whose point has these `inputs`, unless the point has
+  /// a row. Throws StorageError, also for a row that violates a constraint of the table.
   void run(const AddResults& change, const protocol::PointResult& result,
            const protocol::Point& inputs, std::int64_t model_id);
 
@@ -51,20 +51,21 @@ class ResultInsert {
   void put_lists(const solver::CaseResult& result);
 
   Statement insert_;
-  solver::CaseResult outputs_;        // a member to reuse its memory
-  int next_ = 0;                      // index of the next parameter
-  std::array<std::string, 5> lists_;  // texts of the lists; a member to reuse their memory
+  solver::CaseResult outputs_;        // a member, so that its memory is reused
+  int next_ = 0;                      // index of the next parameter to bind
+  std::array<std::string, 5> lists_;  // JSON texts; a member, to reuse their memory
 };
 
-/// Finds and inserts rows of `models` by the model's canonical text (proto/recipe/model_message.h).
+/// Finds and inserts rows of `models`. The key is the model's canonical text
+/// (proto/recipe/model_message.h).
 class ModelRows {
  public:
-  /// The connection must outlive this.
+  /// The connection must outlive this object.
   explicit ModelRows(sqlite3* database);
 
-  /// The number of the model's row; 0 if there is none. Throws StorageError.
+  /// Returns the number of the model's row; 0 if there is no row. Throws StorageError.
   std::int64_t find(const solver::ModelParameters& model);
-  /// The same, but inserts a missing row.
+  /// Returns the number of the model's row. Inserts a missing row. Throws StorageError.
   std::int64_t find_or_insert(const solver::ModelParameters& model);
 
  private:

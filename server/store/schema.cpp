@@ -10,7 +10,7 @@
 namespace oblique::server {
 namespace {
 
-/// SQLite's description of a table: its kind and columns, without defaults and checks.
+/// Returns SQLite's description of a table: kind and columns, but no defaults and checks.
 std::string description(sqlite3* database, const std::string& table) {
   Statement text(database,
                  "SELECT (SELECT type || wr || strict FROM pragma_table_list"

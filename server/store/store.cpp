@@ -12,7 +12,7 @@ namespace oblique::server {
 namespace {
 
 constexpr std::size_t kMaxCachedModels = 65536;
-/// Instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
+/// Number of instructions of SQLite's virtual machine between checks for an interrupt: about 10 us.
 constexpr int kStepsBetweenInterrupts = 1000;
 
 }  // namespace
@@ -26,12 +26,13 @@ Store::Store(const std::string& path)
         return static_cast<std::atomic<bool>*>(interrupted)->load() ? 1 : 0;
       },
       &interrupted_);
-  // Triggers of other programs might never end, and ours is for other programs only.
+  // Disables triggers: those of other programs might never end, and ours only serves other
+  // programs.
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
   sqlite3_db_config(database, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
-  // Do not overwrite deleted rows with zeros, which would write many pages.
+  // Does not overwrite deleted rows with zeros, because that would write many pages.
   execute(database, "PRAGMA secure_delete = OFF");
-  // For a new file only: rows waste less space in pages of this size.
+  // Applies to a new file only. Rows waste less space in pages of this size.
   execute(database, "PRAGMA page_size = 8192");
   log_ = std::make_unique<WriteAheadLog>(database);
   const DatabaseKind kind = identify(database, path);
@@ -46,7 +47,7 @@ Store::Store(const std::string& path)
   }
   prepare_schema(path);
   if (kind == DatabaseKind::kEmpty) {
-    log_->merge();  // makes a new file a complete database
+    log_->merge();  // a new file then contains the whole database
   }
   in_transaction(true, [this] {
     count_completed_points(database_.get());
@@ -56,7 +57,7 @@ Store::Store(const std::string& path)
   ranges_ = std::make_unique<CompletedRanges>(database);
 }
 
-/// Creates the views, and refuses a file that lacks a table or has it with other columns.
+/// Creates the views. Throws StorageError if a table is missing or has other columns.
 void Store::prepare_schema(const std::string& path) {
   if (const auto tables = differing_tables(database_.get()); !tables.empty()) {
     throw StorageError(fmt::format(
@@ -83,14 +84,14 @@ Store::~Store() {
       log_->delete_on_close();
     }
   } catch (const StorageGone&) {
-    // Another file is at the path. Our log must not remain beside it, so it is merged into the open
-    // file.
+    // The path belongs to another file now. Our log must not remain beside that file, so it is
+    // merged into the file that is open.
     try {
       if (!sync_failed_) {
         log_->merge();
       }
     } catch (const StorageError&) {
-      // The log stays.
+      // The log remains, and nothing can be done about that.
     }
   }
 }
@@ -130,7 +131,7 @@ void Store::commit(std::span<const Change> changes) {
     ranges_->forget();
     throw;
   }
-  file_.check();  // throws if the transaction was written to a file that is no longer at the path
+  file_.check();  // throws if the path belongs to another file, so that the transaction is lost
   guard_syncs([this] { log_->shorten(); });
 }
 
@@ -172,7 +173,7 @@ ClearedAway Store::clear_away(std::size_t most) {
     return static_cast<std::size_t>(sqlite3_changes(database_.get()));
   };
   std::size_t results = 0;
-  // No sync is needed: rows that reappear after a power failure are deleted again.
+  // No sync is needed: if a power failure restores the rows, they are deleted again.
   in_transaction(false, [&] {
     results = delete_some(
         "DELETE FROM results WHERE study_id = ?1 AND point IN"
@@ -191,8 +192,8 @@ ClearedAway Store::clear_away(std::size_t most) {
   return ClearedAway::kPart;
 }
 
-/// Deletes models and workers without rows, once all rows of deleted studies are gone. Reads all
-/// rows of the file. Called only at a start, before any model or worker is in use.
+/// Deletes models and workers that have no rows, once all rows of deleted studies are gone. Reads
+/// all rows of the file. Must be called at a start only, before any model or worker is in use.
 void Store::remove_orphans() {
   if (number("SELECT has_orphans AND NOT EXISTS (SELECT 1 FROM deletions) FROM about") == 0) {
     return;
@@ -289,7 +290,7 @@ void Store::add(const AddResults& change) {
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point inputs = protocol::inputs_of(result, *change.table);
     statements_->add_result.run(change, result, inputs, stored_model(change, inputs.model));
-    ranges_->add(change.study_id, result.point());  // also if the point already had a row
+    ranges_->add(change.study_id, result.point());  // done even if the point already had a row
   }
   if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
       !left_out.empty()) {
@@ -299,7 +300,7 @@ void Store::add(const AddResults& change) {
   }
 }
 
-/// False for a deleted study, whose late results may arrive.
+/// Returns false for a deleted study, for which late results may arrive.
 bool Store::has_study(std::uint64_t study_id) {
   Statement& find = statements_->find_study;
   find.bind(1, study_id);
@@ -308,7 +309,7 @@ bool Store::has_study(std::uint64_t study_id) {
   return found;
 }
 
-/// The number of the row of `models` for model number `model` of the study. Inserts a missing row.
+/// Returns the row number in `models` of the study's model `model`. Inserts a missing row.
 std::int64_t Store::stored_model(const AddResults& change, std::uint64_t model) {
   if (models_.size() >= kMaxCachedModels) {
     models_.clear();

@@ -26,22 +26,22 @@ struct StoredStudy {
   StudyState state;
   std::string created_at;
   std::int32_t priority = 0;
-  std::string solver_version;  ///< of its results; empty: none
+  std::string solver_version;  ///< version that made its results; empty without results
   IntervalSet completed;
   IntervalSet failures;        ///< completed points that failed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
-  bool reuses = false;         ///< the lookup of results of other studies has not ended
+  bool reuses = false;         ///< true if the lookup of other studies' results has not ended
   std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out
   std::map<std::string, std::uint64_t> reused{};  ///< number of reused results by source study
 };
 
-/// The SQLite database (schema.sql), opened for writing. A file can be open in one Store only;
-/// other programs can read it. A new file has mode 0600. Results are committed without a sync, so a
-/// power failure can undo the last ones, which are then solved again. Other changes are synced.
+/// The SQLite database (schema.sql), opened for writing. Only one Store can have a file open; other
+/// programs can read the file. A new file has mode 0600. Results are committed without a sync, so a
+/// power failure can undo the last results, which are then solved again. Other changes are synced.
 class Store final : public Storage {
  public:
-  /// Opens or creates the database at `path`. Throws StorageError for a directory, for a file of
-  /// another format or schema, for a file that is damaged or cannot be written, and for one that
+  /// Opens or creates the database at `path`. Throws StorageError if `path` is a directory, a file
+  /// of another format or schema, a file that is damaged or cannot be written, or a file that
   /// another server has open.
   explicit Store(const std::string& path);
   ~Store() override;
@@ -51,35 +51,35 @@ class Store final : public Storage {
   bool merge_log() override;
   void interrupt() override { interrupted_ = true; }
   ClearedAway clear_away(std::size_t most) override;
-  /// Number of rows deleted by `clear_away`.
+  /// Returns the number of rows that `clear_away` has deleted.
   std::uint64_t cleared_rows() const { return cleared_rows_; }
 
-  /// Runs `work` in a durable transaction; rolls back if `work` throws. Throws as `commit` does.
+  /// Runs `work` in a durable transaction; rolls back if `work` throws. Throws the errors of
+  /// `commit`.
   void write(const std::function<void()>& work);
-  /// The connection, for programs that change the file without a server. Triggers and views are
-  /// disabled in it.
+  /// Returns the connection, for programs that change the file without a server. Triggers are off.
   sqlite3* connection() const { return database_.get(); }
 
-  /// Whether the file was created.
+  /// Returns whether the file was created by this object.
   bool is_new() const { return file_.is_new(); }
 
   /// Sets the length of the write-ahead log [pages] above which it is copied into the database.
   void checkpoint_at(int pages) { log_->shorten_at(pages); }
 
-  /// All studies in the order of their numbers, with their completed points. Throws StorageError,
-  /// also for a study whose number, recipe or size was changed after it was stored.
+  /// Returns all studies in the order of their numbers, with their completed points. Throws
+  /// StorageError, also for a study whose number, recipe or size was changed after it was stored.
   std::vector<StoredStudy> studies();
-  /// A sentence about each study that `studies` skipped because this version refuses it.
+  /// Returns a sentence about each study that `studies` skipped because this version refuses it.
   const std::vector<std::string>& skipped() const { return skipped_; }
 
-  /// Highest number of a study or worker so far; 0: none. Throws StorageError.
+  /// Return the highest number of a study or worker ever used; 0: none. Throw StorageError.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
 
-  /// Increments the number of server starts, durably, and returns it.
+  /// Increments the number of server starts in the database, durably, and returns it.
   std::uint64_t count_start();
 
-  /// A random text that was set when the file was created.
+  /// Returns the random text that was stored when the file was created.
   std::string database_id();
 
  private:
@@ -97,7 +97,7 @@ class Store final : public Storage {
   void add(const AddWorker& change);
   void add(const AddResults& change);
   void prepare_schema(const std::string& path);
-  /// Runs `work` and records whether a sync failed.
+  /// Runs `work` and sets `sync_failed_` if a sync fails.
   void guard_syncs(const std::function<void()>& work);
   void in_transaction(bool full_sync, const std::function<void()>& work);
   void remove_orphans();
@@ -105,14 +105,14 @@ class Store final : public Storage {
   std::int64_t stored_model(const AddResults& change, std::uint64_t model);
   std::uint64_t number(const std::string& sql);
 
-  ServerFile file_;                        // must outlive the connection
-  std::atomic<bool> interrupted_ = false;  // must outlive the connection
+  ServerFile file_;                        // declared first, because it must outlive the connection
+  std::atomic<bool> interrupted_ = false;  // declared before the connection, which uses it
   DatabaseHandle database_;
   std::unique_ptr<WriteAheadLog> log_;
   std::unique_ptr<Statements> statements_;
   std::unique_ptr<CompletedRanges> ranges_;
-  // Cache of row numbers of `models`, by study and model number. Cleared if it is large or a
-  // transaction fails.
+  // Cache of row numbers of `models`, by study and model number. It is cleared when it becomes
+  // large or a transaction fails.
   std::map<std::pair<std::uint64_t, std::uint64_t>, std::int64_t> models_;
   std::uint64_t cleared_rows_ = 0;
   bool full_sync_ = true;

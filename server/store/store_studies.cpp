@@ -59,10 +59,9 @@ void check_studies(sqlite3* database) {
   }
 }
 
-/// Why this version refuses the study, or an empty text. Throws StorageError for a recipe that
-/// cannot be read.
+/// Returns why this version refuses the study, or "". Throws StorageError for an unreadable recipe.
 std::string study_error(const StoredStudy& study) {
-  if (!protocol::is_utf8(study.name)) {  // messages must be UTF-8
+  if (!protocol::is_utf8(study.name)) {  // the name is part of messages, which must be UTF-8
     return "its name is not UTF-8: rename it with sqlite3 while no server runs";
   }
   try {

@@ -12,7 +12,8 @@ namespace {
 sqlite3_file* file_of(sqlite3* database) {
   sqlite3_file* file = nullptr;
   sqlite3_file_control(database, "main", SQLITE_FCNTL_JOURNAL_POINTER, &file);
-  return file != nullptr && file->pMethods != nullptr ? file : nullptr;  // otherwise it is not open
+  // null if the log is not open
+  return file != nullptr && file->pMethods != nullptr ? file : nullptr;
 }
 
 /// Rewrites every byte of the file unchanged and syncs it. Returns SQLite's result code.
@@ -67,12 +68,12 @@ void WriteAheadLog::shorten() {
   int in_log = 0;
   int copied = 0;
   if (checkpoint(SQLITE_CHECKPOINT_PASSIVE, &in_log, &copied) == SQLITE_OK && in_log == copied) {
-    pages_ = 0;  // the next commit starts the log again
+    pages_ = 0;  // the next commit overwrites the log from its beginning
   }
 }
 
 bool WriteAheadLog::merge() {
-  // No timeout, because results would wait for a slow reader.
+  // Does not wait for a slow reader, because results would have to wait too.
   sqlite3_busy_timeout(database_, 0);
   const int code = checkpoint(SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
   sqlite3_busy_timeout(database_, kBusyTimeout_ms);

@@ -13,7 +13,7 @@
 namespace oblique::server {
 namespace {
 
-/// Maximum number of jobs in one transaction; limits the wait for acknowledgements.
+/// Maximum number of jobs in one transaction. It limits the time until results are acknowledged.
 constexpr std::size_t kLargestGroup = 256;
 
 constexpr std::chrono::milliseconds kRetryPause{500};
@@ -21,12 +21,12 @@ constexpr std::chrono::milliseconds kRetryPause{500};
 /// Interval between calls of `maintain` while no job waits.
 constexpr std::chrono::milliseconds kTendPause{1000};
 
-/// Number of rows of deleted studies per step (about 10 ms). Waiting jobs are written between
-/// steps; a pause follows a step that failed or must wait.
+/// Number of rows of deleted studies that are deleted at a time (about 10 ms). Waiting jobs are
+/// written in between. After a failure the next attempt waits for the pause below.
 constexpr std::size_t kRowsAtOnce = 1000;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
-/// Number of attempts to merge a log that readers hold before this is reported.
+/// Number of failed attempts to merge the log before the failure is reported.
 constexpr int kQuietTries = 5;
 
 /// Number of attempts to merge the log at the end, and the pause between them: three seconds in
@@ -88,7 +88,7 @@ std::size_t Writer::finish() {
 }
 
 void Writer::run() {
-  std::deque<WriteJob> jobs;  // removed from the queue, not yet durable
+  std::deque<WriteJob> jobs;  // jobs that were removed from the queue and are not durable yet
   while (true) {
     bool last_round = false;
     {
@@ -149,7 +149,7 @@ CommitCounts Writer::commits() const {
 
 void Writer::merge_before_the_end() {
   if (commits_.is_faulty()) {
-    return;  // the loss of the waiting jobs is reported
+    return;  // the caller reports the jobs that were not stored
   }
   std::vector<WriteReport> reports;
   bool merged = false;
@@ -200,7 +200,7 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const std::exception&) {
-    // For example a full disk, which the next commit reports. The next step tries again.
+    // A full disk, for example, is reported by the next commit. The next step tries again.
   }
   return false;
 }
@@ -213,7 +213,7 @@ bool GroupCommit::merge(std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const StorageError& error) {
-    why_unmerged_ = error.what();  // nothing is lost, because the log remains
+    why_unmerged_ = error.what();  // no data is lost, because the log remains
   }
   return false;
 }
@@ -239,7 +239,7 @@ void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& 
 
 bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports) {
   std::size_t size = 0;
-  // A group ends with the first lookup, which takes as long as thousands of results.
+  // A lookup of reusable results ends the group, because it takes as long as thousands of results.
   for (bool has_lookup = false; size < std::min(jobs.size(), kLargestGroup) && !has_lookup;
        ++size) {
     has_lookup = std::holds_alternative<ReuseResults>(jobs[size].change);
@@ -260,9 +260,9 @@ bool GroupCommit::write_group(std::deque<WriteJob>& jobs, std::vector<WriteRepor
     put_back();
     note_gone(error, reports);
     return true;
-  } catch (const std::exception&) {  // std::bad_alloc included
+  } catch (const std::exception&) {  // catches std::bad_alloc too
     put_back();
-    return false;  // `write_singly` finds the failing job
+    return false;  // `write_singly` then finds the job that fails
   }
   note_committed(changes);
   if (std::exchange(faulty_, false)) {
@@ -284,9 +284,9 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     kept.push_back(std::move(job));
   };
   for (WriteJob& job : jobs) {
-    // Changes of a study must keep their order: "done, then retried" must not become "retried, then
-    // done". So once a job waits, later jobs that may wait do so, too, and all later changes of its
-    // study are refused.
+    // Changes of one study must keep their order: "done, then retried" must not become "retried,
+    // then done". So once a job must wait, later jobs without a waiting client wait too, and all
+    // other later changes of its study are refused.
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

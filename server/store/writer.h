@@ -22,7 +22,7 @@ namespace oblique::server {
 /// Counts observed values in bins. Not thread-safe.
 class Histogram {
  public:
-  /// `bounds` ascend. Each is the largest value of its bin; larger values are in one more bin.
+  /// `bounds` must ascend. Each is the largest value of its bin. Larger values have one more bin.
   explicit Histogram(std::vector<double> bounds)
       : bounds_(std::move(bounds)), counts_(bounds_.size() + 1) {}
 
@@ -33,7 +33,7 @@ class Histogram {
   }
 
   const std::vector<double>& bounds() const { return bounds_; }
-  /// Number of values per bin; one more than bounds.
+  /// Returns the number of values in each bin. There is one more bin than bounds.
   const std::vector<std::uint64_t>& counts() const { return counts_; }
   double sum() const { return sum_; }
 
@@ -46,21 +46,20 @@ class Histogram {
 struct WriteJob {
   std::uint64_t ticket;
   Change change;
-  /// Whether a failure is reported at once, because a client waits. Otherwise the change is
+  /// If true, a failure is reported at once, because a client waits. If false, the change is
   /// repeated until it succeeds.
   bool answer_failure;
 };
 
-/// The outcome of a job, or a change of the database's state.
+/// The outcome of a job, or a change in what the database accepts.
 struct WriteReport {
   enum class Kind {
     kStored,     ///< the job is durable
     kRefused,    ///< the job failed and was dropped; `error` has the reason
-    kFault,      ///< the database accepts no changes, so jobs wait; reported once
-    kRecovered,  ///< it accepts changes again
-    kGone,       ///< the file is gone or a sync failed; nothing more is written; reported once
-    /// the log cannot be merged; `error` has the reason; reported once per finished study and at
-    /// the end
+    kFault,      ///< the database accepts no changes and jobs wait; reported once
+    kRecovered,  ///< the database accepts changes again
+    kGone,       ///< the file is gone or a sync failed, so nothing more is written; reported once
+    /// the log cannot be merged, see `error`; reported once per finished study and at the end
     kUnmerged,
   };
   Kind kind;
@@ -71,41 +70,42 @@ struct WriteReport {
 /// Counts of commits since the writer began.
 struct CommitCounts {
   Histogram duration_s{{0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0}};
-  Histogram rows{{1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16'384.0, 65'536.0}};  ///< results
+  /// number of results
+  Histogram rows{{1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0, 16'384.0, 65'536.0}};
 };
 
-/// Writes jobs in groups, one transaction each. Has no thread or clock.
+/// Writes jobs in groups, each group in one transaction. Has no thread or clock.
 class GroupCommit {
  public:
-  /// `storage` must outlive this.
+  /// `storage` must outlive this object.
   explicit GroupCommit(Storage& storage) : storage_(storage) {}
 
-  /// Writes the first jobs in one transaction and removes those that are durable or refused. If the
-  /// transaction fails, each job gets its own, so that one bad change does not block the others.
-  /// Keeps the order of changes of one study.
+  /// Writes the first jobs in one transaction and removes durable and refused jobs. If the
+  /// transaction fails, each job gets a transaction of its own, so that one bad change does not
+  /// block the others. Keeps the order of changes of one study.
   std::vector<WriteReport> write(std::deque<WriteJob>& jobs);
 
-  /// Number of results made durable so far.
+  /// Returns the number of results that are durable so far.
   std::uint64_t rows() const { return rows_; }
-  /// Whether the database did not accept all jobs of the last write.
+  /// Returns whether the database refused jobs of the last write, which now wait.
   bool is_faulty() const { return faulty_; }
-  /// Whether nothing more is written, as after WriteReport::Kind::kGone.
+  /// Returns whether nothing more is written, because WriteReport::Kind::kGone was reported.
   bool is_gone() const { return gone_; }
 
-  /// To be called at a start, because an earlier process may have left rows of deleted studies.
+  /// Must be called at a start, because an earlier process may have left rows of deleted studies.
   void resume_deletions() { clears_ = true; }
-  /// Whether rows of deleted studies may be left.
+  /// Returns whether rows of deleted studies may be left.
   bool has_to_clear() const { return clears_ && !gone_; }
-  /// Deletes at most `most` of these rows. False if the next call should wait.
+  /// Deletes at most `most` rows of deleted studies. Returns false if the next call should wait.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
-  /// To be called regularly while no job waits. Checks the file of the database, and merges its log
-  /// after a study is done.
+  /// Checks the file of the database, and merges its log after a study is done. Must be called
+  /// regularly while no job waits.
   std::vector<WriteReport> maintain();
 
-  /// Merges the log. False if it was not merged; then check `is_gone` before another attempt.
+  /// Merges the log. Returns false if that failed; then check `is_gone` before another attempt.
   bool merge(std::vector<WriteReport>& reports);
-  /// The report of a failed `merge`.
+  /// Returns the report of a failed `merge`.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
 
  private:
@@ -119,9 +119,9 @@ class GroupCommit {
   std::uint64_t rows_ = 0;
   bool faulty_ = false;
   bool gone_ = false;
-  bool clears_ = false;        // rows of deleted studies may be left
-  bool to_be_merged_ = false;  // a study is done, so the log should be merged
-  int tries_ = 0;              // number of attempts to merge since then
+  bool clears_ = false;        // true if rows of deleted studies may be left
+  bool to_be_merged_ = false;  // true if a study is done, so that the log should be merged
+  int tries_ = 0;              // number of failed attempts to merge since then
   std::string why_unmerged_;
 };
 
@@ -130,22 +130,21 @@ class Writer {
  public:
   using Report = std::function<void(std::vector<WriteReport>)>;
 
-  /// `report` is called on the writer's thread after each commit. `storage` must outlive this.
-  /// `finish` interrupts a step that takes longer than `longest_last_step`.
+  /// `report` is called on the writer's thread after each commit. `storage` must outlive this
+  /// object. `finish` interrupts a step that takes longer than `longest_last_step`.
   Writer(Storage& storage, Report report,
          std::chrono::milliseconds longest_last_step = std::chrono::seconds(5));
-  /// Stops, without waiting for jobs that keep failing.
+  /// Ends the thread. Does not wait for jobs that keep failing.
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
   void submit(WriteJob job);
 
-  /// Continues deletions that an earlier process left. Call it when no other thread uses the
-  /// storage any more.
+  /// Continues deletions that an earlier process left. Nothing else may use the storage any more.
   void resume_deletions();
 
-  /// Writes the waiting jobs, merges the log and ends the thread; interrupts statements that take
+  /// Writes the waiting jobs, merges the log and ends the thread. Interrupts statements that take
   /// too long. Returns the number of jobs that were not stored.
   std::size_t finish();
 
@@ -160,20 +159,20 @@ class Writer {
 
   Storage& storage_;
   const std::chrono::milliseconds longest_last_step_;
-  GroupCommit commits_;  // used by the thread only
+  GroupCommit commits_;  // used only by the thread
   Report report_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<WriteJob> queue_;  // guarded by mutex_
   bool finishing_ = false;      // guarded by mutex_
   bool resumes_ = false;        // guarded by mutex_
-  std::uint64_t steps_ = 0;     // steps started by the thread; guarded by mutex_
-  bool has_ended_ = false;      // the thread has ended; guarded by mutex_
+  std::uint64_t steps_ = 0;     // number of steps that the thread has started; guarded by mutex_
+  bool has_ended_ = false;      // true after the thread has ended; guarded by mutex_
   std::condition_variable ended_;
   CommitCounts counts_;        // guarded by mutex_
-  std::size_t left_over_ = 0;  // written by the thread, read after it ended
-  std::chrono::steady_clock::time_point clears_from_{};  // used by the thread only
-  std::thread thread_;                                   // last: it uses the other members
+  std::size_t left_over_ = 0;  // written by the thread, read after the thread has ended
+  std::chrono::steady_clock::time_point clears_from_{};  // used only by the thread
+  std::thread thread_;  // declared last, as it uses the other members
 };
 
 }  // namespace oblique::server

@@ -15,7 +15,7 @@ struct Interval {
   bool operator==(const Interval&) const = default;
 };
 
-/// Number of points of disjoint intervals.
+/// Returns the number of points of disjoint intervals.
 inline std::uint64_t size_of(const std::vector<Interval>& intervals) {
   std::uint64_t points = 0;
   for (const Interval& interval : intervals) {
@@ -24,12 +24,12 @@ inline std::uint64_t size_of(const std::vector<Interval>& intervals) {
   return points;
 }
 
-/// A set of points as disjoint intervals with gaps between them. Its cost depends on the number of
-/// intervals, not of points.
+/// A set of points, stored as disjoint intervals that do not touch. Its cost depends on the number
+/// of intervals, not of points.
 class IntervalSet {
  public:
   IntervalSet() = default;
-  /// The interval [begin, end); empty if begin == end.
+  /// Creates the set [begin, end), which is empty if begin == end.
   IntervalSet(std::uint64_t begin, std::uint64_t end) { insert(begin, end); }
 
   /// Adds [begin, end), which may overlap the set. Does nothing if begin >= end.
@@ -41,7 +41,7 @@ class IntervalSet {
     }
   }
 
-  /// Removes [begin, end), of which parts may be missing.
+  /// Removes [begin, end). Parts of it may be missing in the set.
   void erase(std::uint64_t begin, std::uint64_t end);
   void erase(std::uint64_t point) { erase(point, point + 1); }
 
@@ -54,17 +54,16 @@ class IntervalSet {
   /// Number of intervals.
   std::size_t intervals() const { return ends_.size(); }
 
-  /// The lowest interval. The set must not be empty.
+  /// Returns the lowest interval. The set must not be empty.
   Interval front() const { return {ends_.begin()->first, ends_.begin()->second}; }
 
-  /// The highest interval. The set must not be empty.
+  /// Returns the highest interval. The set must not be empty.
   Interval back() const { return {ends_.rbegin()->first, ends_.rbegin()->second}; }
 
-  /// The first interval that ends after `point`, without its part before `point`; none if there is
-  /// none.
+  /// Returns the first interval that ends after `point`, without its part before `point`, if any.
   std::optional<Interval> first_from(std::uint64_t point) const;
 
-  /// The parts of the set that lie in [begin, end), in order.
+  /// Returns the parts of the set inside [begin, end), in order.
   std::vector<Interval> within(std::uint64_t begin, std::uint64_t end) const;
 
   /// Calls `visit` with every interval, in order.

@@ -24,7 +24,7 @@ Recipe parsed(const std::string& bytes) {
   return recipe;
 }
 
-/// Whether `longer` is `block` with a larger sample that contains the same first points.
+/// Returns whether `longer` only adds points to the sample of `block`, after the same first points.
 bool is_larger_sample(const Block& block, const Block& longer) {
   if (!block.has_sample() || block.sample().kind() == protocol::SAMPLE_LATIN_HYPERCUBE ||
       longer.sample().count() <= block.sample().count()) {

@@ -9,46 +9,46 @@
 
 namespace oblique::server {
 
-/// How a given recipe relates to the stored one of a study.
+/// How a given recipe differs from the stored recipe of a study.
 struct Growth {
   enum class Kind {
-    kSame,     ///< the same model and blocks
-    kLonger,   ///< the given recipe begins with the stored one: the study may grow
+    kSame,     ///< both have the same model and blocks
+    kLonger,   ///< the given recipe begins with the stored one, so the study may grow
     kShorter,  ///< the stored recipe begins with the given one
     kOther,
   };
   Kind kind;
-  /// The differences, one per line, for kShorter and kOther.
+  /// The differences, one per line. Set for kShorter and kOther.
   std::string difference;
 };
 
 /// Compares two checked recipes block by block, as they are written. A study can grow by blocks at
-/// the end, or by a larger count of its last block's sample unless that is a Latin hypercube.
+/// its end, or by a larger count in the sample of its last block, except in a Latin hypercube.
 Growth growth_of(const protocol::Recipe& stored, const protocol::Recipe& given);
 
-/// The recipe of a study in the server: its bytes, and the table of its points, which is made when
-/// needed and can be released. A paused or done study needs memory for its bytes only. Copies share
-/// the table. Not thread-safe except `size` and `recipe_bytes`; other threads may use the table
-/// that `get` returned.
+/// The recipe of a study in the server: its bytes and the table of its points. The table is made
+/// when it is needed and can be released; a paused or done study then needs memory for the bytes
+/// only. Copies share the table. Not thread-safe except `size` and `recipe_bytes`; other threads
+/// may use the table that `get` returned.
 class StudyTable {
  public:
   StudyTable() = default;
-  /// From the table of a recipe that passed `validate_points`.
+  /// Uses the table of a recipe that passed `validate_points`.
   StudyTable(std::shared_ptr<const protocol::PointTable> table);  // NOLINT: implicit on purpose
-  /// From the bytes and the number of points of a stored recipe, which was validated before.
+  /// Uses the bytes and the number of points of a stored recipe, which was validated before.
   StudyTable(std::string recipe_bytes, std::uint64_t points);
 
-  /// Number of points, including left-out ones.
+  /// Returns the number of points, including left-out points.
   std::uint64_t size() const { return shared_->points; }
   /// Encoded oblique.protocol.Recipe.
   const std::string& recipe_bytes() const { return shared_->recipe_bytes; }
 
-  /// How the recipe of `other` relates to this one, in time proportional to their sizes. Throws
-  /// std::runtime_error if one of them cannot be read.
+  /// Returns how the recipe of `other` differs from this one. Takes time proportional to their
+  /// sizes. Throws std::runtime_error if one of them cannot be read.
   Growth growth_to(const StudyTable& other) const;
 
-  /// The table; makes it if necessary. Throws solver::InputError for a recipe that this version
-  /// refuses, and std::runtime_error for bytes that are not a recipe of `size` points.
+  /// Returns the table, and makes it if necessary. Throws solver::InputError for a recipe that this
+  /// version refuses, and std::runtime_error for bytes that are not a recipe of `size` points.
   const std::shared_ptr<const protocol::PointTable>& get() const;
   const protocol::PointTable* operator->() const { return get().get(); }
 

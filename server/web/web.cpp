@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::int64_t kSnapshotInterval_ms = 500;
 constexpr std::int64_t kLongestTurn_ms = 5000;
-/// With less free space than this the server is not ready; 80 000 results need it.
+/// Minimum free space of a disk. With less the server is not ready; 80 000 results need this space.
 constexpr double kLeastFree_bytes = 64.0 * 1024 * 1024;
 
 std::int64_t steady_ms() {
@@ -68,7 +68,7 @@ std::optional<WebSettings> HttpOptions::settings() const {
   if (!token_file_.empty()) {
     settings.page.token = PageToken::from_file(token_file_);
   }
-  // A second server on a machine runs without HTTP if the first one uses the default port.
+  // If the default port is in use, for example by a second server, the server runs without HTTP.
   settings.may_be_missing = address_option_->count() == 0;
   return settings;
 }

@@ -20,22 +20,22 @@ namespace oblique::server {
 
 struct WebSettings {
   HttpAddress address;
-  /// If the address is in use, the server runs without HTTP.
+  /// If true and the address is in use, the server runs without HTTP.
   bool may_be_missing = false;
-  std::set<std::string> names;  ///< host names besides addresses and localhost, in lower case
+  std::set<std::string> names;  ///< further allowed host names, in lower case
   HttpLimits limits;
   std::string database;  ///< path of the database file
   PageSettings page;
   std::string solver_version;
 };
 
-/// The flags for HTTP.
+/// The command-line flags for HTTP.
 class HttpOptions {
  public:
-  /// This object must outlive the parsing.
+  /// This object must outlive the parsing of the command line.
   void add_to(CLI::App& app);
-  /// The settings from the parsed flags; nothing: no HTTP. Throws std::runtime_error for an invalid
-  /// address or name.
+  /// Returns the settings from the parsed flags; nothing if HTTP is off. Throws std::runtime_error
+  /// for an invalid address or name.
   std::optional<WebSettings> settings() const;
 
  private:
@@ -47,29 +47,29 @@ class HttpOptions {
 };
 
 /// HTTP interface of the server: metrics and health for machines, and the page for people. The
-/// event loop publishes a snapshot twice a second and handles requests to the service; it does
-/// nothing else for HTTP.
+/// event loop publishes a snapshot twice a second and answers requests to the service; the HTTP
+/// thread does the rest.
 class Web {
  public:
-  /// Starts to answer. Throws std::runtime_error with the address on failure.
+  /// Starts to answer requests. Throws std::runtime_error, which names the address, if it cannot.
   explicit Web(WebSettings settings);
 
-  /// Such as http://127.0.0.1:7602.
+  /// Returns an address such as http://127.0.0.1:7602.
   std::string url() const { return http_.url(); }
-  /// The same with the token for the page.
+  /// Returns the page's address with its token.
   std::string page_url() const { return url() + "/?token=" + page_.token().text(); }
 
   // ---- Called by the event loop.
-  /// Whether the page is the client with that identity.
+  // Returns whether the client with this identity is the page.
   static bool is_client(const std::string& identity) {
     return identity == ServiceClient::kIdentity;
   }
-  /// Readable when the page has requests.
+  /// Becomes readable when the page has requests.
   int descriptor() const { return service_.descriptor(); }
   std::vector<std::string> take_requests() { return service_.take(); }
   /// Passes an encoded reply to the page. Returns true.
   bool put_reply(const std::string& frame);
-  /// To be called several times a second.
+  /// Must be called several times a second.
   void tick(const SnapshotSources& sources, std::int64_t now_ms);
 
  private:
@@ -77,14 +77,14 @@ class Web {
 
   const WebSettings settings_;
   const std::int64_t started_ms_;
-  std::int64_t published_ms_ = 0;  // used by the event loop only
+  std::int64_t published_ms_ = 0;  // used only by the event loop
   SnapshotCache snapshots_;
   ServiceClient service_;
   Page page_;
-  HttpServer http_;  // last: its thread uses the other members
+  HttpServer http_;  // declared last, because its thread uses the other members
 };
 
-/// Health: 200 if the latest snapshot, or the start, is recent enough, so the event loop runs.
+/// Health: 200 if the latest snapshot, or the start, is recent, which means that the loop runs.
 HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms);
 
 /// Readiness: 200 unless the server is stopping, the database accepts no results, or its disk is

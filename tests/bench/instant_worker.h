@@ -12,7 +12,7 @@
 
 namespace oblique::bench {
 
-/// A worker in this process that answers every point at once with the same result, solved
+/// A worker in this process that answers every point at once with one result, which was solved
 /// beforehand.
 class InstantWorker {
  public:

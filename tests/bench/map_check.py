@@ -42,7 +42,8 @@ def segments(found):
         inner = [i for i, vertex in enumerate(curve) if curves_of[vertex] == 1]
         if not inner:  # both its vertices belong to other borders too
             continue
-        # The bracket points from `from` to `to`: to the left where it turns left from the curve's direction.
+        # Each vertex has a bracket: two points with different regions, `from` and `to`. If the
+        # bracket turns left from the direction of the curve, `to` is on the left side.
         turns = []
         for i in inner:
             direction = at[curve[min(i + 1, len(curve) - 1)]] - at[curve[max(i - 1, 0)]]
@@ -74,7 +75,7 @@ def judged(found, x, y):
             continue
         offset = x0 + (y[these] - y0) / (y1 - y0) * (x1 - x0) - x[these]
         for sign in (1, -1):
-            # A chord that goes up has its left side towards lower x.
+            # A chord towards higher y has its left side at lower x.
             name = left if (y1 > y0) == (sign == 1) else right
             closer = (sign * offset > 0) & (sign * offset < nearest[sign][these])
             nearest[sign][these[closer]] = sign * offset[closer]

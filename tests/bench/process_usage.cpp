@@ -10,7 +10,7 @@
 namespace oblique::bench {
 namespace {
 
-/// User and system time from a `stat` file of /proc.
+/// Returns the user and system time [s] in a `stat` file of /proc.
 double cpu_s_of(const std::string& file) {
   std::ifstream stat(file);
   const std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());

@@ -4,10 +4,10 @@
 
 namespace oblique::bench {
 
-/// Resources that a running process has used so far; zeros if it has ended.
+/// Resources that a running process has used so far; zeros if the process has ended.
 struct Usage {
-  double cpu_s = 0.0;               ///< of all threads
-  double first_thread_cpu_s = 0.0;  ///< of the main thread
+  double cpu_s = 0.0;               ///< time of all threads
+  double first_thread_cpu_s = 0.0;  ///< time of the main thread
   double resident_MB = 0.0;
   double peak_MB = 0.0;
 };

@@ -23,14 +23,14 @@
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 
-/// Whole studies with real processes. Measures wall time, CPU and memory of each process, and the
-/// size of the database. README.md has the commands.
+/// Benchmarks whole studies with real processes. Measures wall time, CPU time and memory of each
+/// process, and the size of the database. README.md has the commands.
 namespace oblique::bench {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// A study of about `points` points: a grid over H, mu and e.
+/// Returns arguments for a study of about `points` points: a grid over H, mu and e.
 std::vector<std::string> study_of(std::uint64_t points) {
   const auto side =
       static_cast<std::uint64_t>(std::llround(std::cbrt(static_cast<double>(points))));
@@ -42,7 +42,7 @@ std::vector<std::string> study_of(std::uint64_t points) {
       "0.2:1.0" + count, "--name", "bench"};
 }
 
-/// `points` points, each with its own model.
+/// Returns arguments for a study of `points` points, each with its own model.
 std::vector<std::string> models_of(std::uint64_t points) {
   return {"--k",      "1e7:9e7:" + std::to_string(points),
           "--preset", "paper",
@@ -58,7 +58,7 @@ double megabytes(const std::string& file) {
   return missing ? 0.0 : static_cast<double>(bytes) / 1e6;
 }
 
-/// One study that `oblique` submits and watches to its end.
+/// A study that `oblique` submits and watches until its end.
 struct Study {
   explicit Study(std::uint64_t points) : Study(study_of(points)) {}
   explicit Study(std::vector<std::string> flags) : arguments(std::move(flags)) {}
@@ -133,7 +133,7 @@ Usage run_and_watch(const test::TemporaryFolder& folder,
   return last;
 }
 
-/// Merges a complete study into an empty database, then once more into the same database.
+/// Merges a complete study into an empty database, and then again into the same database.
 void bench_merge(std::uint64_t points) {
   Study study(points);
   {
@@ -159,7 +159,7 @@ void wait_for(const std::function<bool()>& condition) {
   }
 }
 
-/// A study that has been submitted and is not waited for.
+/// A study that is submitted without waiting for its end.
 struct Underway : Study {
   explicit Underway(std::uint64_t points) : Study(points) {
     std::vector<std::string> submit{"submit", "--server", server.client_url()};
@@ -169,8 +169,8 @@ struct Underway : Study {
   double count() const { return database.rows(); }
 };
 
-/// Measures the time from the kill of a worker until another worker has solved its last point.
-/// Those points have attempt 2.
+/// Measures the time from killing a worker until another worker has solved all points of the killed
+/// one. These points have attempt 2.
 void bench_worker_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker survivor(study.folder, study.server.worker_url());
@@ -181,15 +181,14 @@ void bench_worker_killed(std::uint64_t points) {
   victim.wait();
   std::this_thread::sleep_for(std::chrono::seconds(5));
   const double held = study.database.number("SELECT count(*) FROM results WHERE attempt > 1");
-  // From SQLite's Julian days to seconds since 1970.
+  // Converts SQLite's Julian days to seconds since 1970.
   const double solved_s = study.database.number(
       "SELECT (julianday(max(solved_at)) - 2440587.5) * 86400 FROM results WHERE attempt > 1");
   std::printf("| %.3g | %.0f | %.2f |\n", static_cast<double>(points), held,
               solved_s - std::chrono::duration<double>(killed).count());
 }
 
-/// Measures the time from the kill and restart of a server until results of both workers are
-/// stored.
+/// Measures the time from killing and restarting the server until both workers' results are stored.
 void bench_server_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker one(study.folder, study.server.worker_url());

@@ -29,7 +29,7 @@ using solver::FingerPoint;
 using solver::ModelParameters;
 using solver::Point;
 
-/// A grid of 8 drops, 8 frictions and 8 restitutions.
+/// Returns a grid of 8 drops, 8 frictions and 8 restitutions.
 std::vector<Point> sweep() {
   std::vector<Point> points;
   for (int i = 0; i < 8; ++i) {
@@ -54,7 +54,7 @@ void count_cases(benchmark::State& bench, std::size_t cases_an_iteration) {
       benchmark::Counter::kIsRate);
 }
 
-/// One contact, scalar.
+/// Solves one contact without vector lanes.
 void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::StepChoice& steps,
                   const Point& point) {
   const solver::ExplicitMotion motion(chain);
@@ -64,7 +64,7 @@ void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::St
                             steps.contact(point.e_star), fall.state_at(point.H_m), {}));
 }
 
-/// Builds the model and solves the fall for every point; no lanes. A simple script would do this.
+/// Builds the model and solves the fall for every point, without lanes, as a simple script would.
 void naive(benchmark::State& bench) {
   const std::vector<Point> points = sweep();
   std::size_t next = 0;
@@ -74,13 +74,13 @@ void naive(benchmark::State& bench) {
     const solver::StepChoice steps(chain, model);
     const auto fall = solver::solve_stepped_fall(chain, steps.fall_s());
     solve_scalar(chain, *fall, steps, points[next]);
-    next = (next + 37) % points.size();  // spread over the grid
+    next = (next + 37) % points.size();  // spreads the points over the grid
   }
   count_cases(bench, 1);
 }
 BENCHMARK(naive)->Unit(benchmark::kMillisecond);
 
-/// One fall for all points; scalar.
+/// Solves all points after one fall, without vector lanes.
 void shared_fall(benchmark::State& bench) {
   const ModelParameters model = with_elements(bench.range(0));
   const Chain chain(model);
@@ -96,12 +96,12 @@ void shared_fall(benchmark::State& bench) {
 }
 BENCHMARK(shared_fall)->Arg(4)->Arg(16)->Unit(benchmark::kMicrosecond);
 
-/// One fall for all points, vector lanes, and that number of threads.
+/// Solves all points after one fall on vector lanes. The second argument is the number of threads.
 void lanes_and_threads(benchmark::State& bench) {
   const Finger finger(with_elements(bench.range(0)));
   const auto threads = static_cast<std::size_t>(bench.range(1));
   const std::vector<Point> points = sweep();
-  finger.largest_drop_m();  // solves the fall
+  finger.largest_drop_m();  // solves the fall before the measurement
   for (auto _ : bench) {
     std::atomic<std::size_t> next{0};
     std::vector<std::jthread> workers;
@@ -128,7 +128,7 @@ BENCHMARK(lanes_and_threads)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-/// Solves the points `point_at(0)`, `point_at(1)`, ... as a worker's thread does.
+/// Solves the points `point_at(0)`, `point_at(1)`, and so on, as a thread of a worker does.
 void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>& point_at) {
   std::size_t next = 0;
   solver::solve_points(
@@ -143,7 +143,7 @@ void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>&
       });
 }
 
-/// Every point has its own k and eta2. All share one fall, and have one drop or 8 drops.
+/// Every point has its own k and eta2. All points share one fall; they have one drop or 8 drops.
 void distinct_contacts(benchmark::State& bench) {
   const ModelParameters model = solver::preset("paper");
   const auto fallen = solver::solve_falls({&model, 1}).front().fallen;
@@ -163,7 +163,7 @@ void distinct_contacts(benchmark::State& bench) {
 }
 BENCHMARK(distinct_contacts)->ArgName("drops")->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond);
 
-/// Every point has its own E, I and lengths, so its own fall; twice as many points as lanes.
+/// Every point has its own E, I and lengths, and so its own fall. Twice as many points as lanes.
 void distinct_chains(benchmark::State& bench) {
   const std::size_t cases = 2 * solver::runnable_lane_kernels().front().lanes;
   int round = 0;
@@ -186,7 +186,7 @@ void distinct_chains(benchmark::State& bench) {
 }
 BENCHMARK(distinct_chains)->ArgName("n")->Arg(4)->Arg(16)->Unit(benchmark::kMillisecond);
 
-/// One point of a model whose fall is not cached.
+/// Solves one point of a model whose fall is not cached.
 void fresh_point(benchmark::State& bench) {
   for (auto _ : bench) {
     benchmark::DoNotOptimize(Finger(with_elements(bench.range(0))).solve(1.0, 0.4, 1.0));

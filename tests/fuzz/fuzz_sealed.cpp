@@ -16,7 +16,8 @@ void require(bool is_so) {
 }
 
 /// Sends one MESSAGE with flags and body from the piece. If the highest bit of the flags is set,
-/// the box is changed in transit. Only an unchanged message of one frame may come out.
+/// the encrypted box is changed in transit. The port must accept only an unchanged message of one
+/// frame.
 void send_frame(Zmtp& zmtp, CurveClient& client, std::string_view piece) {
   constexpr unsigned kIsChanged = 0x80;
   constexpr std::size_t kMuch = std::size_t{1} << 20U;
@@ -35,7 +36,7 @@ void send_frame(Zmtp& zmtp, CurveClient& client, std::string_view piece) {
 }  // namespace
 }  // namespace oblique::server
 
-/// Frames of a peer after its handshake.
+/// The input consists of frames that a peer sends after its handshake.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace oblique::server;
   static const KeyedPort port;

@@ -12,7 +12,7 @@
 namespace oblique::server {
 namespace {
 
-/// Ports that record writes and drop everything else.
+/// Ports of the service that record writes and discard everything else.
 class Sink final : public Ports {
  public:
   Delivery to_worker(const std::string&, const std::string&) override { return Delivery::kSent; }
@@ -28,7 +28,7 @@ class Sink final : public Ports {
   std::vector<WriteJob> jobs;
 };
 
-/// The input is a conversation: the first byte of each piece selects the sender and the length.
+/// Uses the input as messages to a service: the first byte of each piece selects sender and length.
 void converse(std::string_view input) {
   Sink ports;
   ServiceSettings settings;

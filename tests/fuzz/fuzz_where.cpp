@@ -18,7 +18,7 @@ namespace {
 
 using oblique::server::Change;
 
-/// A database with a study without rows; its file is deleted after it is opened.
+/// A database that contains a study without rows. Its file is deleted after it is opened.
 struct Opened {
   oblique::server::Reader reader;
   oblique::server::DatabaseHandle database;
@@ -50,7 +50,7 @@ bool is_taken(const std::string& condition) {
   }
 }
 
-/// An accepted condition cannot reach beyond its brackets, so there is never a row.
+/// Checks that an accepted condition has no effect outside its brackets: there must be no row.
 void expect_no_row(oblique::server::Reader& database, const std::string& condition) {
   const auto reply =
       database.query("SELECT 1 FROM (SELECT 1 AS point, 0.4 AS mu, 0.9 AS e) WHERE (" + condition +
@@ -61,7 +61,8 @@ void expect_no_row(oblique::server::Reader& database, const std::string& conditi
   }
 }
 
-/// Uses the text as a part of a query, selected by its length: gives a plan or an InputError.
+/// Uses the text as one part of a query; the length of the text selects the part. The query must
+/// give a plan or an InputError.
 void plan_query(sqlite3* database, const std::string& text) {
   constexpr std::size_t kParts = 4;
   oblique::protocol::StudyQuery question;
@@ -89,7 +90,7 @@ void plan_query(sqlite3* database, const std::string& text) {
 
 }  // namespace
 
-/// A condition as after --where gives an answer or a QueryError, and never changes the database.
+/// Checks that a condition gives an answer or a QueryError and never changes the database.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Opened& files = opened();
   const std::string condition(reinterpret_cast<const char*>(data), size);

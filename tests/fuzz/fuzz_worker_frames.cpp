@@ -12,7 +12,7 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
   return 0;
 }
 
-/// Frames of a server to a worker; the first byte of each piece is its length.
+/// The input is frames from a server to a worker. The first byte of each piece is its length.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::string_view input(reinterpret_cast<const char*>(data), size);
   oblique::protocol::WorkerHello hello;

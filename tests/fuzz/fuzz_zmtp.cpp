@@ -15,7 +15,7 @@ void send_pieces(Zmtp& zmtp, std::string_view input) {
   }
 }
 
-/// A valid INITIATE changed by the input must not be admitted.
+/// Checks that a peer is not admitted if the input changes its valid INITIATE.
 void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   be_welcomed(zmtp, client);
   const std::string sound = client.initiate();
@@ -30,7 +30,7 @@ void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   }
 }
 
-/// Uses the input as properties in a valid INITIATE.
+/// Uses the input as the properties in a valid INITIATE.
 void send_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   constexpr std::size_t kMax = 3500;
   be_welcomed(zmtp, client);
@@ -41,7 +41,8 @@ void send_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
 }  // namespace
 }  // namespace oblique::server
 
-/// The bytes of one connection. The first one chooses the port, and how much is valid.
+/// The input is what a peer sends on one connection. Its first byte selects a port with or without
+/// keys, and which part of the handshake is valid.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace oblique::server;
   static const KeyedPort port;

@@ -12,7 +12,7 @@
 
 namespace oblique::server {
 
-/// A port with keys, and a peer that is admitted there.
+/// A port with keys, and the key of a peer that the port admits.
 struct KeyedPort {
   protocol::KeyPair server = protocol::generate_key_pair();
   protocol::KeyPair own = protocol::generate_key_pair();
@@ -36,7 +36,7 @@ inline std::string send(Zmtp& zmtp, std::string_view bytes) {
   return zmtp.take_answers();
 }
 
-/// The next piece of the input; its first byte is its length.
+/// Returns the next piece of the input. The first byte of a piece is its length.
 inline std::string_view next_piece(std::string_view& input) {
   const std::size_t length =
       std::min<std::size_t>(static_cast<unsigned char>(input.front()), input.size() - 1);

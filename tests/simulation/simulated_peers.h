@@ -103,7 +103,7 @@ class SimulatedWorker {
     planned_time_ms_ = -1;
     worker::ConversationSettings settings;
     if (leaves_ && world_.chance(0.2)) {
-      settings.exit.until_ms = world_.now_ms() + world_.between(3000, 60'000);
+      settings.exit.stop_ms = world_.now_ms() + world_.between(0, 57'000);
     }
     conversation_.emplace(hello, settings);
     apply(conversation_->start(world_.now_ms()));

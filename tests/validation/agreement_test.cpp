@@ -19,12 +19,12 @@ namespace {
 
 using solver::CaseResult;
 
-/// One output of a case, and the scale of its errors.
+/// One output of a case, with the scale of its errors.
 struct Output {
   std::string name;
   std::string relative_to;
   std::function<std::vector<double>(const solver::CaseResult&)> values;
-  /// The scale of value i: the same for all values of the output, or the value itself.
+  /// Scale of a value: a quantity that all values of the output share, or the value itself.
   std::function<double(const solver::CaseResult&, double value)> scale;
   /// False if the number of values depends on ripples.
   bool is_headline;
@@ -73,7 +73,7 @@ Values tangential_peaks(const CaseResult& r) {
   return values;
 }
 
-/// Ends of all phases except the last, whose end is the duration.
+/// End times of all phases except the last phase, whose end is the duration.
 Values turns(const CaseResult& r) {
   Values values;
   for (const auto& phase : r.phases) {
@@ -104,7 +104,7 @@ Values reactions(const CaseResult& r) {
   return values;
 }
 
-/// All numerical outputs of a case.
+/// Returns all numerical outputs of a case.
 std::vector<Output> outputs() {
   return {
       {"largest F_n", "itself", [](const CaseResult& r) { return Values{r.fn_peak_N}; }, itself,
@@ -137,8 +137,8 @@ std::vector<Output> outputs() {
   };
 }
 
-/// Largest difference of one output between two results, relative to its scale in `right`. Both
-/// results must have the same number of values.
+/// Returns the largest difference of one output between two results, relative to its scale in
+/// `right`. Both results must have the same number of values.
 double difference(const Output& output, const std::vector<double>& values,
                   const solver::CaseResult& right) {
   const Values expected = output.values(right);
@@ -152,13 +152,13 @@ double difference(const Output& output, const std::vector<double>& values,
   return largest;
 }
 
-/// Whether both results have the same mode, so that every output has the same number of values.
+/// Whether both results have the same mode. Each output then has the same number of values in both.
 bool have_same_turns(const solver::CaseResult& a, const solver::CaseResult& b) {
   return a.mode == b.mode && a.phases.size() == b.phases.size() &&
          a.ft_peaks.size() == b.ft_peaks.size();
 }
 
-/// Explicit steps of the reference, at which PEFRL's own error is below 1e-9.
+/// Step of the explicit reference solution, at which the error of PEFRL is below 1e-9.
 constexpr double kReferenceStep_s = 2e-7;
 const std::string kReference = "explicit, 0.2 us";
 
@@ -174,7 +174,7 @@ std::vector<Point> grid() {
   return points;
 }
 
-/// Bounds by the name and the scale of an output.
+/// Bound of an output's difference. `Bounds` is ordered by the output's name and scale.
 struct Bound {
   double value;
   std::string reason;
@@ -185,7 +185,7 @@ std::string key(const Output& output) {
   return output.name + ", of " + output.relative_to;
 }
 
-/// Largest difference of each output over all added cases.
+/// Collects the largest difference of each output over all cases.
 class Differences {
  public:
   /// `values` contains the values of each output, in the order of outputs().
@@ -228,7 +228,7 @@ std::vector<std::vector<double>> values_of(const CaseResult& result) {
   return values;
 }
 
-/// (4 f(h/2) - f(h))/3: Richardson extrapolation of an error of order 2.
+/// Richardson extrapolation of an error of order 2: (4 f(h/2) - f(h))/3.
 std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const CaseResult& half) {
   auto values = values_of(half);
   const auto coarse = values_of(whole);
@@ -240,8 +240,8 @@ std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const Cas
   return values;
 }
 
-// Vibrations of w = 1.5e5 rad/s have about a tenth of the speed. Over a contact of T = 0.5 ms the
-// period error (w h)^2/12 of the method shifts their phase by 1.4e-3 rad at 0.1 us.
+// Vibrations of w = 1.5e5 rad/s have about a tenth of the speed. The method's period error (w
+// h)^2/12 at h = 0.1 us shifts their phase by 1.4e-3 rad over a contact of T = 0.5 ms.
 const std::string kPeriodError =
     "a tenth of the speed vibrates at w = 1.5e5/s: phase error (w h)^2/12 w T = 1.4e-3";
 const std::string kSlowExit = "the same; some exits are slow";
@@ -330,7 +330,7 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
 TEST(Agreement, EstimatedErrorsBoundTheErrorsOfTheStepsInAllOutputsAndInstantsOfSixtyContacts) {
   const solver::ModelParameters model = solver::preset("standard");
   solver::ModelParameters fine = model;
-  fine.step_factor = 0.25;  // an error 256 times smaller
+  fine.step_factor = 0.25;  // error of order 4: 256 times smaller
   const solver::Finger finger(model);
   const solver::Finger companion(solver::companion_model(model));
   const solver::Finger reference(fine);

@@ -30,8 +30,8 @@ inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
                                                          {1.00, 1.4, 1.0},
                                                          {1.00, 1.6, 1.0}}};
 
-/// One chain with both integrators. Contacts start from the same state at touch, that of an
-/// explicit fall, so that results differ by the errors in contact only.
+/// One chain with both integrators. Both contacts start from the state at touch after an explicit
+/// fall, so results differ only by the errors in the contact.
 class BothWays {
  public:
   explicit BothWays(const solver::ModelParameters& model)
@@ -46,7 +46,7 @@ class BothWays {
   const solver::GeneralizedAlphaMotion& by_generalized_alpha() const { return generalized_alpha_; }
   const solver::Fall& fall() const { return *fall_; }
 
-  /// The state at touch in the coordinates of each integrator.
+  /// The state at touch, in the coordinates of each integrator.
   solver::ChainState explicit_touch(double H_m) const { return fall_->state_at(H_m); }
   solver::ChainState generalized_alpha_touch(double H_m) const {
     return from_eliminated(generalized_alpha_.chain(), fall_->state_at(H_m));
@@ -65,7 +65,7 @@ class BothWays {
   }
 
  private:
-  /// Step of the fall [s], at which its error is 1e-10 of the speed.
+  /// Step of the fall [s]. Its error is 1e-10 of the speed.
   static constexpr double kFallStep_s = 2e-6;
 
   solver::ModelParameters model_;

@@ -19,8 +19,8 @@ constexpr std::size_t kClamped = 4;  ///< coordinates of the first node
 constexpr double kConverged = 1e-12;
 constexpr int kMaxIterations = 50;
 
-/// A cantilever of the solver's elements in static equilibrium, found by Newton's method with the
-/// solver's tangent. Unloaded it is straight along x; it is clamped at the origin.
+/// A cantilever of the solver's elements in static equilibrium, which Newton's method finds with
+/// the solver's tangent. It is clamped at the origin; without load it is straight along x.
 class ClampedBeam {
  public:
   struct Properties {
@@ -30,20 +30,20 @@ class ClampedBeam {
     int elements;
   };
   struct TipLoad {
-    double force_y_N;   ///< of constant direction
+    double force_y_N;   ///< force of constant direction
     double moment_N_m;  ///< counter-clockwise
   };
   struct Tip {
     double x_m;
     double y_m;
-    double angle_rad;  ///< of the tangent, in (-pi, pi]
+    double angle_rad;  ///< angle of the tangent, in (-pi, pi]
   };
 
   explicit ClampedBeam(const Properties& properties);
 
   /// Applies `load` in `increments` equal steps. Throws std::runtime_error if Newton's method does
-  /// not converge: its largest correction (for positions in units of an element's length) must fall
-  /// below 1e-12 within 50 iterations.
+  /// not converge: within 50 iterations, its largest correction (for positions in units of an
+  /// element's length) must fall below 1e-12.
   void load_to(const TipLoad& load, int increments);
   Tip tip() const;
 
@@ -54,7 +54,7 @@ class ClampedBeam {
   Properties properties_;
   double element_length_m_;
   TipLoad load_{0.0, 0.0};
-  std::vector<double> q_;  ///< x, y of position, x, y of slope, node by node
+  std::vector<double> q_;  ///< per node: x and y of the position, x and y of the slope
 };
 
 ClampedBeam::ClampedBeam(const Properties& properties)
@@ -124,7 +124,7 @@ double ClampedBeam::newton_step(const TipLoad& load) {
   if (!matrix.factor()) {
     throw std::runtime_error("the tangent of the clamped beam is singular");
   }
-  matrix.solve(residual);
+  matrix.solve(residual.data());
   double largest = 0.0;
   for (std::size_t i = 0; i < residual.size(); ++i) {
     q_[i + kClamped] -= residual[i];
@@ -176,7 +176,7 @@ ClampedBeam beam_of(int elements) {
       {kLength_m, kSlenderness * kEI_N_m2 / (kLength_m * kLength_m), kEI_N_m2, elements});
 }
 
-/// Distance between the tip and the tip of the elastica, over the length.
+/// Returns the distance between the computed tip and that of the elastica, divided by the length.
 double elastica_error(double alpha, int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({alpha * kEI_N_m2 / (kLength_m * kLength_m), 0.0}, 20);
@@ -186,8 +186,8 @@ double elastica_error(double alpha, int elements) {
                     1.0 - tip.x_m / kLength_m - right.u_over_L);
 }
 
-/// Distance between tip and clamp, over the length, for the moment that bends the beam to a full
-/// circle.
+/// Returns the distance between tip and clamp, divided by the length, under the moment that bends
+/// the beam to a full circle.
 double roll_up_error(int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({0.0, 2.0 * M_PI * kEI_N_m2 / kLength_m}, 40);

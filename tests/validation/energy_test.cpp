@@ -17,8 +17,8 @@ using solver::Motion;
 
 const std::string kBalance = "kinetic + strain + gravity + springs + losses = constant";
 
-/// The energy that is missing in the balance of a contact, over the exchanged work, computed from
-/// the parts of the result.
+/// Returns the energy that is missing in the balance of a contact, divided by the exchanged work.
+/// Computes both from the parts of the result.
 double closure(const CaseResult& result) {
   const solver::ContactEnergy& e = result.energy;
   const double missing_J =
@@ -43,7 +43,7 @@ TEST(Energy, BalancesInThePublishedContactsWithBothIntegrators) {
        kBalance, by_generalized_alpha, 1e-6, "stated accuracy"});
 }
 
-/// Change of the energy in the fall to H = 1, over the kinetic energy there.
+/// Returns the change of the energy in the fall to H = 1 m, divided by the kinetic energy there.
 double fall_drift(const Motion& motion, const solver::Fall& fall) {
   const solver::Energies before = motion.energies(motion.at_rest());
   const solver::Energies after = motion.energies(fall.state_at(1.0));

@@ -26,7 +26,7 @@ using solver::ModelParameters;
 using solver::Motion;
 using solver::TipState;
 
-/// Largest errors over known states.
+/// Largest errors over all known states.
 struct FallErrors {
   double t_s = 0.0;
   double x_m = 0.0;
@@ -35,7 +35,8 @@ struct FallErrors {
 
 const std::string kKnownFrom = "independent explicit solution, converged";
 
-/// Three rigid links in minimal coordinates, by a Runge-Kutta method; independent of A and I.
+/// Known state of three rigid links, computed in minimal coordinates by a Runge-Kutta method. It
+/// does not depend on A and I.
 constexpr std::array<KnownFall, 1> kRigid{
     {{1.00, 0.430188812, std::numeric_limits<double>::quiet_NaN(), -5.738072, -5.234437}}};
 

@@ -1,4 +1,4 @@
-// The two studies that worker/solver/accuracy.md shows: which mesh is fine enough, and the errors
+// Computes the two studies in worker/solver/accuracy.md: which mesh is fine enough, and the errors
 // of the chosen steps.
 #include <algorithm>
 #include <cmath>
@@ -48,7 +48,7 @@ Fallen fall_of(const solver::ModelParameters& model) {
   return fall.fallen;
 }
 
-/// The results of `points` in their order. Throws SolveError if a point fails.
+/// Returns the results of `points` in the order of the points. Throws SolveError if a point fails.
 std::vector<CaseResult> contacts_of(const solver::Finger& finger,
                                     const std::vector<ContactPoint>& points) {
   std::vector<solver::Point> solver_points;
@@ -68,19 +68,19 @@ std::vector<CaseResult> contacts_of(const solver::Finger& finger,
 // ---- Meshes ----
 
 constexpr double kTolerance = 0.005;  // relative
-// A mesh is fine enough if each output is within the tolerance at this fraction of its points. Not
-// at all points, because exit velocities pass through zero.
+// A mesh is fine enough if each output is within the tolerance at this fraction of the points. All
+// points would be too strict, because exit velocities pass through zero.
 constexpr double kMaxPoints = 0.8;
 
-/// Errors of one output of a point relative to its limit, one for each level; nothing on a level
-/// whose mode differs from that of the finest level.
+/// Errors of one output of a point relative to its limit, one per level. A level whose mode differs
+/// from that of the finest level has no error.
 struct PointErrors {
   std::size_t point;
   double limit;
   std::vector<std::optional<double>> errors;
 };
 
-/// The points of one output.
+/// Errors of one output at all points.
 struct OutputStudy {
   std::string name;
   std::vector<PointErrors> points;
@@ -96,8 +96,8 @@ std::size_t points_within(const OutputStudy& output, std::size_t level) {
                     [&](const PointErrors& point) { return is_within(point.errors[level]); }));
 }
 
-/// Peaks of F_n count as one output with the largest error, and so do reactions. The largest F_n is
-/// one of the peaks.
+/// Returns the name under which an output counts. All peaks of F_n, which include fn_peak_N, count
+/// as one output with the largest of their errors; so do all reactions.
 std::string counted_under(const std::string& name) {
   return name.starts_with("major_peak") ? "major_peaks_N"
          : name.starts_with("reaction") ? "reaction_peaks_N"
@@ -109,7 +109,7 @@ void add_point(std::vector<OutputStudy>& outputs, std::size_t point,
   for (const auto& output : convergence.outputs) {
     const double limit = output.extrapolation.limit;
     if (output.name == "fn_peak_N" ||
-        limit == 0.0) {  // for example of stick in a contact without stick
+        limit == 0.0) {  // for example the stick of a contact without stick
       continue;
     }
     std::vector<std::optional<double>> errors;
@@ -166,8 +166,8 @@ void print_cells(const std::vector<Level>& levels, const std::vector<OutputStudy
   print(std::cout, table, Format::kTable);
 }
 
-/// The coarsest level from which on all levels are fine enough; the number of levels if there is
-/// none.
+/// Returns the coarsest level for which it and all finer levels are fine enough, or the number of
+/// levels if there is none.
 std::size_t coarsest_good_enough(std::size_t levels, const std::vector<OutputStudy>& outputs) {
   const auto is_good_enough = [&](std::size_t level) {
     return std::all_of(outputs.begin(), outputs.end(), [&](const OutputStudy& output) {
@@ -250,32 +250,32 @@ void study_meshes() {
 
 // ---- Steps ----
 
-/// A model with the points and steps at which its errors are measured.
+/// A model, and the points and steps at which its errors are measured.
 struct StepCase {
   std::string name;  ///< for example "k = 1e+08"
   solver::ModelParameters model;
   std::size_t points = 300;
   double least_e =
-      solver::StepChoice::kFastRestitution;  ///< smallest e*; below the default, steps shrink
+      solver::StepChoice::kFastRestitution;  ///< smallest e*; smaller values need shorter steps
   double largest_e = 1.0;
-  std::vector<double> factors{1.0};  ///< by which the chosen steps are multiplied
+  std::vector<double> factors{1.0};  ///< factors that multiply the chosen steps
 };
 
-/// Largest errors over the points of one mode.
+/// Largest errors over all points of one mode.
 struct StepErrors {
   double step_s = 0.0;     ///< in compression
-  double of_limit = 0.0;   ///< over the longest stable step
-  double peaks = 0.0;      ///< of major peaks of F_n, over the largest of the contact
-  double each_peak = 0.0;  ///< the same, over the peak itself
+  double of_limit = 0.0;   ///< step in compression, divided by the longest stable step
+  double peaks = 0.0;      ///< error of major peaks of F_n, relative to the largest
+  double each_peak = 0.0;  ///< error of major peaks of F_n, relative to each peak
   double duration = 0.0;   ///< relative
   double slide = 0.0;      ///< relative
   double stick_s = 0.0;
-  double exit_m_s = 0.0;         ///< larger one of both exit velocities
+  double exit_m_s = 0.0;         ///< error of the exit velocity: larger component
   std::int64_t late_sticks = 0;  ///< points whose stick has an error above 5 ns
-  std::int64_t grazing = 0;      ///< points whose mode differs between the steps; excluded
+  std::int64_t grazing = 0;      ///< excluded points, whose mode differs between the steps
 };
 
-/// Meshes, contact stiffnesses, restitution, tip masses and lengths around the preset `paper`.
+/// Returns variations of the preset `paper`: mesh, contact stiffness, e*, tip mass and lengths.
 std::vector<StepCase> step_cases() {
   const auto model = solver::preset("paper");
   std::vector<StepCase> cases;
@@ -304,8 +304,8 @@ std::vector<StepCase> step_cases() {
   return cases;
 }
 
-/// Fixed points spread evenly in H, mu and e*: an additive recurrence with the powers of 1/1.2207,
-/// where 1.2207 is the root of x^4 = x + 1.
+/// Returns fixed points that are spread evenly in H, mu and e*. They follow an additive recurrence
+/// with the powers of 1/1.2207, where 1.2207 is the root of x^4 = x + 1.
 std::vector<ContactPoint> step_points(const StepCase& of, double largest_drop_m) {
   constexpr double kRoot = 1.2207440846057596;
   const auto between = [](double least, double largest, std::size_t i, double step) {
@@ -347,7 +347,7 @@ void judge(const CaseResult& result, const CaseResult& reference, StepErrors& er
   }
 }
 
-/// One row for each factor of the case.
+/// Returns one row for each factor of the case.
 std::vector<StepErrors> step_errors(const StepCase& of) {
   constexpr double kReferenceFactor = 1.0 / 6.0;
   const auto fallen = fall_of(of.model);

@@ -21,7 +21,7 @@ using solver::Contact;
 using solver::ContactParameters;
 using solver::Motion;
 
-/// Final state of a run, as vectors that can be subtracted.
+/// Final state of a run, in vectors that can be subtracted.
 struct Outcome {
   std::vector<double> position;
   std::vector<double> velocity;
@@ -48,7 +48,7 @@ void add_state(const Motion& motion, const solver::AffineContactForce<double>& f
   outcome.multipliers = in_turn(reactions_N);
 }
 
-/// Free motion over `steps` steps.
+/// Returns the state after `steps` steps of free motion.
 Outcome fall_for(const Motion& motion, ChainState state, double duration_s, int steps) {
   ChainState next = state;
   motion.restart(kNoContact, state);
@@ -61,7 +61,7 @@ Outcome fall_for(const Motion& motion, ChainState state, double duration_s, int 
   return outcome;
 }
 
-/// Contact from touch to `end_s`, with event location.
+/// Returns the state of a contact from touch to `end_s`, with located events.
 Outcome contact_until(const Motion& motion, const ContactParameters& parameters, ChainState state,
                       double dt_s, double end_s) {
   Contact contact(parameters, motion.tip(state), {dt_s, dt_s});
@@ -98,7 +98,7 @@ double distance(const std::vector<double>& a, const std::vector<double>& b) {
   return std::sqrt(sum);
 }
 
-/// Final state of the explicit integrator in the coordinates of the constrained chain.
+/// Converts the final state of the explicit integrator to the coordinates of the constrained chain.
 Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlphaMotion& motion) {
   ChainState state;
   state.q = in_columns(outcome.position);
@@ -109,10 +109,11 @@ Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlp
   return outcome;
 }
 
-/// Smallest observed orders over some runs.
+/// Collects the smallest observed order of each part over several runs.
 class SmallestOrders {
  public:
-  /// Adds the errors of two runs against `right`; the second run has half the step of the first.
+  /// Adds the order that follows from the errors of two runs against `right`. The second run has
+  /// half the step of the first.
   void add(const Outcome& at_step, const Outcome& at_half, const Outcome& right) {
     for (std::size_t i = 0; i < kParts.size(); ++i) {
       const auto part = kParts[i].values;
@@ -149,15 +150,15 @@ class SmallestOrders {
   std::array<double, kParts.size()> smallest_{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
 };
 
-/// Links so soft that the fall bends them far. With the paper's links the vibration in the fall is
-/// so small that at half the step rounding dominates.
+/// The links are so soft that the fall bends them far. With the paper's links, the vibration in the
+/// fall is so small that rounding dominates at half the step.
 solver::ModelParameters soft_chain() {
   solver::ModelParameters model = solver::preset("paper");
   model.E_Pa *= 1e-4;
   return model;
 }
 constexpr double kFall_s = 0.2;
-/// Before the end of the shortest of the ten contacts.
+/// This time is before the end of the shortest of the ten contacts.
 constexpr double kContact_s = 330e-6;
 
 TEST(Order, OfTheExplicitIntegratorIsFourInTheFall) {

@@ -29,7 +29,7 @@ ModelParameters pendulum() {
   return model;
 }
 
-/// A thousandth of the stiffness, so that swinging bends and stretches the link visibly.
+/// A thousandth of the stiffness makes bending and stretching of the swinging link visible.
 ModelParameters soft_pendulum() {
   ModelParameters model = pendulum();
   model.E_Pa *= 1e-3;
@@ -41,7 +41,7 @@ double energy_J(const Motion& motion, const ChainState& state) {
   return energies.kinetic_J + energies.strain_J + energies.gravity_J;
 }
 
-/// Largest deviation of the energy over `steps` steps from rest, and the final state.
+/// Final state of a run from rest, and its largest deviation of the energy.
 struct Swing {
   ChainState state;
   double energy_drift_J = 0.0;
@@ -60,7 +60,7 @@ Swing swing(const Motion& motion, double dt_s, int steps) {
   return result;
 }
 
-/// First instant at which `value` falls below zero, located by the length of the last step.
+/// Returns the first time at which `value` is below zero, located by varying the last step.
 double first_zero_s(const Motion& motion, ChainState state, double dt_s,
                     const std::function<double(const ChainState&)>& value) {
   ChainState next = state;
@@ -104,8 +104,7 @@ TEST(Pendulum, ConservesItsEnergyWithBothIntegrators) {
 }
 
 TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
-  // A uniform rod released from the horizontal is a pendulum of length 2L/3 with an amplitude of 90
-  // degrees.
+  // A uniform rod released from the horizontal is a pendulum of length 2L/3, amplitude 90 degrees.
   ModelParameters model = pendulum();
   const double quarter_s = std::sqrt(2.0 * model.lengths_m.front() / (3.0 * model.g_m_s2)) *
                            std::comp_ellint_1(std::sqrt(0.5));
@@ -134,14 +133,16 @@ TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
   }
 }
 
-/// Half the period of the first bending vibration between pinned and free end: the instant at which
-/// the modal coordinate phi^T M q returns to zero. Other modes are orthogonal to it.
+/// Returns half the period of the first bending vibration of a beam with a pinned and a free end:
+/// the time at which the modal coordinate phi^T M q returns to zero. Other modes are orthogonal to
+/// phi.
 double half_period_s(const Motion& motion, const ChainState& start, double dt_s) {
   const auto product = [&](const ChainState& state) {
-    // (|a + b|^2 - |a - b|^2)/4 in the norm of the kinetic energy, a across, b the mode.
+    // Computes a^T M b, up to a factor, from kinetic energies T: T(a + b) - T(a - b). a is the
+    // transverse displacement, b the mode.
     ChainState sum = start;
     ChainState difference = start;
-    // The link lies along x, so that transverse positions and slopes are zero at rest.
+    // The link lies along x, so transverse positions and slopes are zero at rest.
     sum.v.row(1) = state.q.row(1) + start.v.row(1);
     difference.v.row(1) = state.q.row(1) - start.v.row(1);
     return motion.energies(sum).kinetic_J - motion.energies(difference).kinetic_J;
@@ -150,7 +151,7 @@ double half_period_s(const Motion& motion, const ChainState& start, double dt_s)
 }
 
 TEST(Pendulum, VibratesAtTheFirstFrequencyOfAPinnedFreeBeam) {
-  constexpr double kRoot = 3.92660231204791879;  // of tan z = tanh z
+  constexpr double kRoot = 3.92660231204791879;  // root of tan z = tanh z
   for (const int elements : {4, 8, 16}) {
     ModelParameters model = pendulum();
     model.g_m_s2 = 1e-12;
@@ -176,7 +177,7 @@ TEST(Pendulum, VibratesAtTheFirstFrequencyOfAPinnedFreeBeam) {
     ChainState constrained = from_eliminated(by_generalized_alpha.chain(), start);
     by_generalized_alpha.restart(kNoContact, constrained);
     const double right_s = M_PI / frequency_rad_s;
-    // The error of the step, at most (w h)^2/12, is far below that of the elements.
+    // The error of the step, at most (w h)^2/12, is far below the error of the elements.
     const double dt_s =
         std::min(1e-6, 0.2 * solver::Pefrl::stability_limit() / chain.highest_frequency_rad_s(0.0));
     const double element = std::pow(kRoot / elements, 4) / 1440.0;

@@ -23,8 +23,8 @@ using solver::RigidImpact;
 
 const std::string kReference = "Stronge, rigid body, closed form";
 
-/// A free rod of 0.5 kg that strikes with its end, at 30 degrees to the ground:
-/// W = (1/m) [1 + 3 sin^2, -3 sin cos; -3 sin cos, 1 + 3 cos^2].
+/// A free rod of 0.5 kg strikes the ground with its end, at 30 degrees: W = (1/m) [1 + 3 sin^2, -3
+/// sin cos; -3 sin cos, 1 + 3 cos^2].
 RigidImpact::Parameters flying_rod(double mu, double e_star, double vt_m_s) {
   const double c = std::cos(M_PI / 6.0);
   const double s = std::sin(M_PI / 6.0);
@@ -45,8 +45,8 @@ CaseResult solved(const RigidImpact::Parameters& p, double dt_s) {
                                motion.moving(p.V0_m_s), {});
 }
 
-/// Largest error of force peaks, duration, exit velocity, slide and stick, each relative to the
-/// largest force, the duration, the speed at touch and that speed times the duration.
+/// Returns the largest relative error of force peaks (scale: largest force), duration, exit
+/// velocity (scale: speed at touch), slide (scale: that speed times the duration) and stick.
 double largest_error(const CaseResult& result, const RigidImpact& right, double speed_m_s) {
   double largest = std::abs(result.duration_s / right.duration_s() - 1.0);
   EXPECT_EQ(result.peaks.size(), right.fn_peaks_N().size());
@@ -67,7 +67,7 @@ struct Regime {
   double mu;
   double vt_m_s;
 };
-/// Each regime of Stronge's theory, with the mode of the closed form.
+/// Regimes of Stronge's theory, each with the mode of the closed form.
 constexpr std::array<Regime, 5> kRegimes{{{"slip throughout", "sC sR", 0.3, 3.0},
                                           {"stick, then slip in restitution", "SC SR sR", 0.8, 1.0},
                                           {"slip, stick, slip", "sC SC SR sR", 0.1, 1.0},
@@ -95,7 +95,7 @@ TEST(RigidImpact, WorkOfRestitutionIsMinusTheSquareOfTheRestitutionTimesThatOfCo
       const RigidImpact::Parameters p = flying_rod(regime.mu, e_star, regime.vt_m_s);
       const CaseResult result = solved(p, RigidImpact(p).duration_s() / 400);
       ASSERT_EQ(result.peaks.size(), 1U);
-      // Compression stores F^2/2k; restitution returns this minus the loss in the result.
+      // Compression stores F^2/2k. Restitution returns this energy minus the loss in the result.
       const double stored_J = result.fn_peak_N * result.fn_peak_N / (2.0 * p.k_N_m);
       const double given_back_J = stored_J - result.energy.restitution_J;
       largest = std::max(largest, std::abs(given_back_J / stored_J - e_star * e_star));
@@ -105,8 +105,7 @@ TEST(RigidImpact, WorkOfRestitutionIsMinusTheSquareOfTheRestitutionTimesThatOfCo
                   "Stronge's definition of e*", largest, 1e-12, "exact; rounding"});
 }
 
-/// Two links so stiff that they impact as rigid ones: W = J M^-1 J^T, with the angles as
-/// coordinates.
+/// Two links so stiff that they impact like rigid ones: W = J M^-1 J^T, with angles as coordinates.
 struct StiffLinks {
   static constexpr double kLength_m = 0.4;
   static constexpr double kAngle_rad[2] = {-0.3, -1.2};
@@ -129,7 +128,7 @@ struct StiffLinks {
     mass *= model.rho_kg_m3 * model.A_m2 * kLength_m * kLength_m * kLength_m;
     RigidImpact::Parameters p;
     p.W_per_kg = J * mass.inverse() * J.transpose();
-    // A hundredth of the finger's stiffness, so that the links deform less.
+    // A hundredth of the finger's contact stiffness makes the links deform less.
     p.k_N_m = 2.7e5;
     p.eta2 = model.eta2;
     p.mu = mu;
@@ -138,11 +137,11 @@ struct StiffLinks {
     return p;
   }
 
-  /// Straight links at the given angles, rotating so that the tip has the velocity V.
+  /// Returns straight links at the given angles, which rotate so that the tip has the velocity V.
   solver::ChainState state(const solver::Chain& chain, const Eigen::Vector2d& V_m_s) const {
     const Eigen::Vector2d rate = J.inverse() * V_m_s;
     solver::ChainState state = chain.at_rest();
-    // Rows: pin, slope; inner link's outer slope, joint, outer link's slope; tip, slope.
+    // Rows of q: pin, slope; inner link's end slope, joint, outer link's first slope; tip, slope.
     const Eigen::Index link_of[7] = {0, 0, 0, 0, 1, 1, 1};
     const bool is_slope[7] = {false, true, true, false, true, false, true};
     const Eigen::Vector2d joint_m = J.col(0).reverse().cwiseProduct(Eigen::Vector2d(1.0, -1.0));
@@ -198,7 +197,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithExplicitSteps) {
   const solver::ExplicitMotion motion(chain);
   const double dt_s = 0.4 * solver::Pefrl::stability_limit() / chain.highest_frequency_rad_s(2.7e5);
   for (const ChainRegime& regime : kChainRegimes) {
-    // A lower speed would make rounding in the stiff links visible.
+    // At a lower speed, rounding in the stiff links would be visible.
     const auto p = links.impact(regime.mu, {-1e-3 * regime.vt_over_vn, -1e-3});
     expect_at_most({std::string("two stiff links, explicit, E * 1e4 (") + regime.mode + ")",
                     kReference,
@@ -208,7 +207,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithExplicitSteps) {
 }
 
 TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithGeneralizedAlpha) {
-  // The steps of this integrator need not shrink with the stiffness.
+  // With this integrator the steps need not shrink with the stiffness.
   const StiffLinks links(1e6);
   const solver::Chain chain(links.model);
   const solver::GeneralizedAlphaMotion motion(links.model);

@@ -20,7 +20,7 @@ std::string three_digits(double value) {
   return text.str();
 }
 
-/// Adds the line to the properties of the running test, from which ValidationTable reads it.
+/// Adds the line to the properties of the running test, where ValidationTable finds it.
 void record(const Check& check, const char* relation) {
   const auto* test = testing::UnitTest::GetInstance()->current_test_info();
   std::ostringstream key;
@@ -31,8 +31,8 @@ void record(const Check& check, const char* relation) {
   testing::Test::RecordProperty(key.str(), line.str());
 }
 
-/// Collects the lines of all tests and prints them at the end of the program as one Markdown table.
-/// Lines are properties of their test, so that XML reports contain them too.
+/// Collects the lines of all tests and prints them as one Markdown table at the end of the program.
+/// The lines are properties of their tests, so XML reports contain them, too.
 class ValidationTable : public testing::EmptyTestEventListener {
  public:
   void OnTestEnd(const testing::TestInfo& test) override {
@@ -71,7 +71,7 @@ void expect_at_least(const Check& check) {
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
-  // GoogleTest owns its listeners.
+  // GoogleTest takes ownership of its listeners.
   testing::UnitTest::GetInstance()->listeners().Append(
       std::make_unique<oblique::validation::ValidationTable>().release());
   return RUN_ALL_TESTS();

@@ -25,7 +25,7 @@ using solver::ModelParameters;
 using solver::Motion;
 using solver::RodEndOnSpring;
 
-/// So small that the response of the elements is linear.
+/// The speed is so small that the response of the elements is linear.
 constexpr double kV0_m_s = 1e-3;
 constexpr double kSpring_N_m = 2.6e7;
 
@@ -39,15 +39,14 @@ ModelParameters link(double length_m, int elements) {
   return model;
 }
 
-/// A horizontal link that rotates about its pin, its tip moving at V0 downwards. All waves start at
-/// the tip.
+/// Returns a horizontal link that rotates about its pin. Its tip, where waves start, has V0 down.
 ChainState turning(const Chain& chain, double length_m) {
   ChainState state = chain.at_rest();
   state.v.row(1) = -kV0_m_s / length_m * state.q.row(0);
   return state;
 }
 
-/// A link that hangs straight down; all nodes except the pinned one move at V0 downwards. A wave
+/// Returns a link that hangs straight down. All nodes except the pinned one move down at V0. A wave
 /// starts at the pin with the speed of sound.
 ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   ChainState state = chain.at_rest();
@@ -59,8 +58,7 @@ ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   return state;
 }
 
-/// Largest difference between the contact force and `right` in [0, duration_s], divided by
-/// `scale_N`.
+/// Returns the largest difference between contact force and `right`, divided by `scale_N`.
 double force_error(const Motion& motion, const solver::AffineContactForce<double>& force,
                    ChainState state, double dt_s, double duration_s, double scale_N,
                    const std::function<double(double)>& right) {
@@ -117,8 +115,9 @@ TEST(Waves, BeamTipOnASpringHasTheForceOfASemiInfiniteBeam) {
   }
 }
 
-/// A rod so long that the wave from the pin does not arrive. Without bending stiffness, because the
-/// paper's curvature includes r'' along the beam, which would stiffen short waves.
+/// Returns a rod so long that the wave from the pin does not arrive. It has almost no bending
+/// stiffness, because the paper's curvature includes r'' along the beam, which would stiffen short
+/// waves.
 ModelParameters rod_of(int elements) {
   ModelParameters model = link(0.8, elements);
   model.I_m4 = 1e-16;
@@ -162,7 +161,7 @@ TEST(Waves, RodOnASpringHasTheForceOfASemiInfiniteRod) {
 }
 
 TEST(Waves, RodOnARigidWallHasTheForceOfASemiInfiniteRod) {
-  // Nearly rigid: the spring compresses for 0.07 us.
+  // The rod is nearly rigid: the spring compresses for 0.07 us.
   const Rod rod(64, 1e11);
   const solver::ExplicitMotion motion(rod.chain);
   ChainState state = falling_along(rod.chain, rod.model);

@@ -180,8 +180,8 @@ TEST(PointsOfABatch, PointsOfManyModelsHaveTheResultsOfSolvingThemAlone) {
   const Batch batch = batch_of(recipe_with_models(3, {6e10, 7e10, 8e10}, {2e7, 3e7}));
   ASSERT_EQ(batch.size(), 18U);
   CountedFalls falls;
-  solver::FallCache one({}, falls.solve);
-  solver::FallCache several({}, falls.solve);
+  solver::FallCache one(kFallBytes, falls.solve);
+  solver::FallCache several(kFallBytes, falls.solve);
   const auto results = solved(batch, one);
   EXPECT_EQ(falls.count(), 3U) << "a fall does not depend on k";
   const auto by_threads = solved(batch, several, 3);
@@ -202,7 +202,7 @@ TEST(PointsOfABatch, PointsOfManyModelsHaveTheResultsOfSolvingThemAlone) {
 TEST(PointsOfABatch, MissingFallsOfLaterPointsAreSolvedTogetherWithTheFirst) {
   const Batch batch = batch_of(recipe_with_models(2, {5e10, 6e10, 7e10, 8e10}, {2e7, 3e7}));
   CountedFalls falls;
-  solver::FallCache cache({}, falls.solve);
+  solver::FallCache cache(kFallBytes, falls.solve);
   solved(batch, cache);
   ASSERT_FALSE(falls.solved.empty());
   const std::size_t lanes = solver::runnable_lane_kernels().front().lanes;
@@ -219,7 +219,7 @@ TEST(PointsOfABatch, AFailingFallIsSolvedOnceAndFailsOnlyThePointsOfItsModels) {
   add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails with 0.025 s
   const Batch batch = batch_of(recipe);
   CountedFalls falls;
-  solver::FallCache cache({}, falls.solve);
+  solver::FallCache cache(kFallBytes, falls.solve);
   for (int again = 0; again < 2; ++again) {
     const auto results = solved(batch, cache);
     for (const auto& result : results) {

@@ -331,10 +331,9 @@ TEST_F(ConversationTest, ASecondStopEndsTheWorkerAtOnceUnlessItFollowsWithinASec
 /// Starts workers with a limit of time or idle time. They leave 3 s before the limit of time.
 class ExitTest : public ConversationTest {
  protected:
-  void leave_within(std::int64_t until_ms, std::int64_t idle_exit_ms = kNever_ms) {
+  void leave_within(std::int64_t duration_ms, std::int64_t idle_exit_ms = kNever_ms) {
     ConversationSettings settings;
-    settings.exit = {.until_ms = until_ms == kNever_ms ? kNever_ms : now_ms_ + until_ms,
-                     .idle_exit_ms = idle_exit_ms};
+    settings.exit = {.stop_ms = now_ms_ + duration_ms, .idle_exit_ms = idle_exit_ms};
     use(settings);
     start();
     auto welcome = welcome_message();
@@ -354,7 +353,7 @@ class ExitTest : public ConversationTest {
 };
 
 TEST_F(ExitTest, AtItsTimeLimitAWorkerGivesBackItsPointsAndLeaves) {
-  leave_within(60'000);
+  leave_within(57'000);
   receive(batch_message(7, 31));
   receive(batch_message(7, 32, 10));
   solve(1, 0, 5, false);
@@ -412,7 +411,7 @@ TEST_F(ExitTest, AWorkerThatWasWelcomedExitsWithZeroEvenIfItsServerIsGone) {
 }
 
 TEST_F(ExitTest, TheNextDeadlineIsNeverLaterThanTheTimeLimit) {
-  leave_within(3100, 50);
+  leave_within(100, 50);
   EXPECT_LE(conversation_->next_deadline_ms(), now_ms_ + 50);
   receive(batch_message(7, 31));
   EXPECT_LE(conversation_->next_deadline_ms(), now_ms_ + 100);

@@ -13,18 +13,17 @@
 namespace oblique::solver {
 namespace {
 
-/// Assumed orders of the mesh's error. Observed orders are 3.5 to 5 for smooth outputs and 1.5 to 4
-/// for rough ones. The lower ones here are a margin: the errors of two meshes may have either sign,
-/// so their difference may be far smaller than each.
+/// Assumed orders of the mesh's error. Observed orders are higher: 3.5 to 5 for smooth outputs and
+/// 1.5 to 4 for rough ones. Errors of two meshes may differ by far less than either.
 constexpr int kSmoothOrder = 2;  ///< largest normal force, duration, slide, impulses
-constexpr int kRoughOrder = 1;   ///< outputs that fast vibrations or single events decide
+constexpr int kRoughOrder = 1;   ///< outputs that depend on fast vibrations or single events
 constexpr int kRefinement = 2;
 
-/// (2 l/L)^4, with l the longest element and L the length of a bending wave as fast as the contact:
-/// the part of the mesh's error for which no order holds yet. The end of a beam struck on a spring
-/// k answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at the tip
-/// the contact is not faster than that mass on the spring. A wave of angular frequency w has the
-/// wavenumber (rho A w^2/(E I))^(1/4).
+/// (2 l/L)^4 with the longest element l and the length L of a bending wave as fast as the contact:
+/// the part of the mesh's error that does not follow the assumed order. The end of a beam struck on
+/// a spring k answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at
+/// the tip the contact is not faster than that mass on the spring. A wave of angular frequency w
+/// has the wavenumber (rho A w^2/(E I))^(1/4).
 double unresolved_waves(const ModelParameters& model) {
   const double mass_per_length_kg_m = model.rho_kg_m3 * model.A_m2;
   const double bending_N_m2 = model.E_Pa * model.I_m4;
@@ -55,8 +54,8 @@ struct SolvedPoint {
   std::optional<Finger> companion = {};  ///< none without a coarser mesh or a fall on it
 };
 
-/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` when the source
-/// has no more.
+/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` at the end of
+/// the source.
 std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
                                     bool& ended) {
   using Clock = std::chrono::steady_clock;
@@ -85,25 +84,19 @@ std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcom
   return points;
 }
 
-/// Sets the companions of points, one for points of a model that follow each other.
+/// Sets the companions of points. Consecutive points of one model share a companion.
 void set_companions(std::vector<SolvedPoint>& points, FallCache& falls) {
   std::vector<ModelParameters> companions;
-  std::vector<std::size_t> number;  // of each point's companion
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const ModelParameters& model = points[i].point.finger.model();
-    if (i == 0 || !(points[i - 1].point.finger.model() == model)) {
-      companions.push_back(companion_model(model));
-    }
-    number.push_back(companions.size() - 1);
+  for (const SolvedPoint& solved : points) {
+    companions.push_back(companion_model(solved.point.finger.model()));
   }
   const std::vector<FallOutcome> fallen = falls.falls(companions);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const ModelParameters& companion = companions[number[i]];
-    if (i > 0 && number[i] == number[i - 1]) {
+    const ModelParameters& model = points[i].point.finger.model();
+    if (i > 0 && points[i - 1].point.finger.model() == model) {
       points[i].companion = points[i - 1].companion;
-    } else if (fallen[number[i]].fallen &&
-               companion.elements_per_link < points[i].point.finger.model().elements_per_link) {
-      points[i].companion.emplace(companion, fallen[number[i]].fallen);
+    } else if (fallen[i].fallen && companions[i].elements_per_link < model.elements_per_link) {
+      points[i].companion.emplace(companions[i], fallen[i].fallen);
     }
   }
 }
@@ -122,14 +115,14 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   const double smooth = factor(model, kSmoothOrder);
   const double rough = factor(model, kRoughOrder);
   const double speed_m_s = std::hypot(result.vt_in_m_s, result.vn_in_m_s);
-  // Error of chosen steps. That of steps that the user set is part of the difference.
+  // Error of automatic steps. The error of steps that the user set is part of the difference.
   const double step_error = model.dt_s == 0.0 ? model.tolerance : 0.0;
   const auto error_of = [&](double difference, double scale) -> std::optional<double> {
     const double error = std::abs(difference) / std::abs(scale);
     if (!std::isfinite(error)) {
       return std::nullopt;
     }
-    // Without a difference the output is exact, as 0 without friction.
+    // Without a difference the output is exact, for example a force of 0 without friction.
     return error > 0.0 ? error + step_error : error;
   };
   const auto error = [&](double factor, double CaseResult::*output, double scale) {
@@ -144,8 +137,7 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
   errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
   errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
-  // The same vibration is in both components of the velocity. The difference of a single component
-  // may pass through 0, so the difference of the vectors is used.
+  // The difference of one component of the velocity may vanish by chance, that of the vector not.
   errors.v_out = error_of(rough * std::hypot(result.vt_out_m_s - companion.vt_out_m_s,
                                              result.vn_out_m_s - companion.vn_out_m_s),
                           speed_m_s);

@@ -7,26 +7,24 @@
 
 namespace oblique::solver {
 
-/// The model whose results are compared with those of `model`: half as many elements a link,
-/// rounded down (1 stays 1 and has no estimate), and steps in contact twice as long, where these
-/// are stable. It takes about a quarter of the time, apart from its own fall.
+/// `model` with half as many elements a link, rounded down (1 stays 1), and steps in contact twice
+/// as long, where these are stable. Solving it takes about a quarter of the time, besides its fall.
 ModelParameters companion_model(const ModelParameters& model);
 
 /// Estimated errors of `result`, a point of `model`, from its differences to `companion`, the same
-/// point of `companion_model(model)` (accuracy.md, "Errors of single results"). Dimensionless: of
-/// forces and impulses relative to the normal one, of times to the duration, of the slide to speed
-/// at touch times duration, of speeds to the speed at touch. Absent where that is 0.
+/// point of `companion_model(model)` (accuracy.md, "Errors of single results"). Forces and impulses
+/// are relative to the normal ones, times to the duration, the slide to speed at touch times
+/// duration, speeds to the speed at touch. Absent where this scale is 0.
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 
-/// The same for one point: its companion is solved here, with a fall from `falls`. Gives the same
-/// bits as solve_points_with_errors(). Empty if there is no coarser mesh or the companion has no
-/// answer.
+/// The same, but solves the companion, with a fall from `falls`. Empty if there is no coarser mesh
+/// or the companion has no answer.
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
                                   FallCache& falls);
 
 /// Like solve_points(), with estimated errors in each result whose companion has an answer. Solves
-/// up to 256 points, for about a second, before their companions, so outcomes come in bursts.
+/// up to 256 points, or points of one second, before their companions; outcomes follow in bursts.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink);
 

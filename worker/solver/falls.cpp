@@ -5,15 +5,12 @@
 #include <exception>
 #include <iterator>
 #include <map>
-#include <new>
 #include <string>
 #include <tuple>
-#include <utility>
 
 #include "worker/solver/fast/kernels.h"
 #include "worker/solver/fast/lane_falls.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/step_choice.h"
 
@@ -27,8 +24,7 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// Maximum number of explicit steps in sqrt(2 length / g) for which they are faster than
-/// collocation (fast/README.md).
+/// With fewer explicit steps in sqrt(2 length/g), stepping is faster than collocation.
 constexpr double kFewSteps = 150'000.0;
 
 bool falls_by_collocation(const FallenChain& chain) {
@@ -43,19 +39,19 @@ FallSolution solve_alone(const FallRequest& request) {
     return {solve_stepped_fall(request.motion, request.dt_s, longest_fall_s(*request.chain),
                                request.progress),
             {}};
-  } catch (const std::bad_alloc&) {  // is no property of this fall
-    throw;
   } catch (const std::exception& error) {
     return {nullptr, error.what()};
   }
 }
 
-std::size_t bytes_of(const std::optional<FallOutcome>& outcome) {
-  return outcome && outcome->fallen ? outcome->fallen->fall().bytes() : 0;
+/// Memory that a solved fall counts for in the cache.
+std::size_t bytes_of(const FallOutcome& outcome) {
+  constexpr std::size_t kError = std::size_t{1} << 20;
+  return outcome.fallen ? outcome.fallen->fall().bytes() : kError;
 }
 
-/// Why `falling` is outside its domain; else empty. A NaN, which equals nothing, would never be
-/// found among the entries.
+/// Returns why `falling` is outside its domain; else an empty text. A model with a NaN equals no
+/// entry of the cache and would never be found.
 std::string fault_of(const ModelParameters& falling) {
   try {
     validate(falling);
@@ -122,8 +118,6 @@ std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
     try {
       chains.push_back(std::make_shared<FallenChain>(models[i]));
       places.push_back(i);
-    } catch (const std::bad_alloc&) {
-      throw;
     } catch (const std::exception& error) {
       outcomes[i].error = error.what();
     }
@@ -137,8 +131,8 @@ std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models) {
 
 // ---- FallCache ----------------------------------------------------------------------------------
 
-FallCache::FallCache(const Bounds& bounds, Solve solve)
-    : bounds_(bounds), solve_(std::move(solve)) {
+FallCache::FallCache(std::size_t most_bytes, Solve solve)
+    : most_bytes_(most_bytes), solve_(std::move(solve)) {
   if (!solve_) {
     solve_ = [](std::span<const ModelParameters> models) { return solve_falls(models); };
   }
@@ -157,7 +151,7 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
     }
     const auto claimed = claim(falling, ahead);
     if (claimed.empty()) {
-      solved_.wait(lock);  // then look again: it may have been solved and removed
+      solved_.wait(lock);
     } else {
       solve(claimed, lock);
     }
@@ -167,11 +161,7 @@ FallOutcome FallCache::fall(const ModelParameters& model, std::span<const ModelP
 std::vector<FallOutcome> FallCache::falls(std::span<const ModelParameters> models) {
   std::vector<FallOutcome> outcomes;
   for (std::size_t i = 0; i < models.size(); ++i) {
-    try {
-      outcomes.push_back(fall(models[i], models.subspan(i + 1)));
-    } catch (const std::exception& error) {
-      outcomes.push_back({nullptr, error.what()});
-    }
+    outcomes.push_back(fall(models[i], models.subspan(i + 1)));
   }
   return outcomes;
 }
@@ -194,7 +184,7 @@ FallOutcome FallCache::use(Entries::iterator entry) {
   return *entry->outcome;
 }
 
-/// Makes entries for the falls that this thread will solve; none if other threads solve them all.
+/// Makes entries for the missing falls that this thread will solve.
 std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters& falling,
                                                            std::span<const ModelParameters> ahead) {
   const bool in_lanes = fall_side_by_side(falling, falling);
@@ -219,65 +209,51 @@ std::vector<FallCache::Entries::iterator> FallCache::claim(const ModelParameters
 }
 
 void FallCache::solve(const std::vector<Entries::iterator>& claimed,
-                      std::unique_lock<std::mutex>& lock) {
-  std::vector<FallOutcome> outcomes;
-  std::exception_ptr failure;
-  lock.unlock();
-  try {
-    std::vector<ModelParameters> models;
-    for (const auto& entry : claimed) {  // its model never changes
-      models.push_back(entry->model);
-    }
-    outcomes = solve_(models);
-  } catch (...) {
-    failure = std::current_exception();
+                      std::unique_lock<std::mutex>& lock) noexcept {
+  std::vector<ModelParameters> models;
+  for (const auto& entry : claimed) {
+    models.push_back(entry->model);
   }
+  lock.unlock();
+  std::vector<FallOutcome> outcomes = solve_(models);
   lock.lock();
   solved_.notify_all();
-  if (failure) {  // threads that wait for these falls solve them again
-    for (const auto& entry : claimed) {
-      entries_.erase(entry);
-    }
-    std::rethrow_exception(failure);
-  }
   for (std::size_t i = claimed.size(); i-- > 0;) {  // the fall needed first is kept longest
+    usual_bytes_ = std::max(bytes_of(outcomes[i]), usual_bytes_ / 2);
     claimed[i]->outcome = std::move(outcomes[i]);
-    usual_bytes_ = std::max(bytes_of(claimed[i]->outcome), usual_bytes_ / 2);
     entries_.splice(entries_.begin(), entries_, claimed[i]);
   }
   make_room();
 }
 
-/// Whether falls solved ahead, with those being solved, take less than half of the bounds.
+/// Whether falls solved ahead, with those being solved, take less than half of the memory.
 bool FallCache::has_room_ahead() const {
-  std::size_t falls = 0;
   std::size_t bytes = 0;
   for (const Entry& entry : entries_) {
     if (!entry.is_used) {
-      ++falls;
-      bytes += entry.outcome ? bytes_of(entry.outcome) : usual_bytes_;
+      bytes += entry.outcome ? bytes_of(*entry.outcome) : usual_bytes_;
     }
   }
-  return 2 * falls < bounds_.falls && 2 * bytes < bounds_.bytes;
+  return 2 * bytes < most_bytes_;
 }
 
-/// Removes the least recently used falls; those solved ahead only if no others are left.
+/// Removes the least recently used falls. Falls solved ahead and not used yet go last.
 void FallCache::make_room() {
   std::size_t falls = 0;
   std::size_t bytes = 0;
   for (const Entry& entry : entries_) {
     falls += entry.outcome ? 1U : 0U;
-    bytes += bytes_of(entry.outcome);
+    bytes += entry.outcome ? bytes_of(*entry.outcome) : 0U;
   }
   for (const bool used : {true, false}) {
     for (auto entry = entries_.end(); entry != entries_.begin();) {
       --entry;
-      if (falls <= 1 || (falls <= bounds_.falls && bytes <= bounds_.bytes)) {
+      if (falls <= 1 || bytes <= most_bytes_) {
         return;
       }
       if (entry->outcome && entry->is_used == used) {
         --falls;
-        bytes -= bytes_of(entry->outcome);
+        bytes -= bytes_of(*entry->outcome);
         entry = entries_.erase(entry);
       }
     }

@@ -13,15 +13,14 @@
 
 namespace oblique::solver {
 
-/// A chain with its motion and, once solve_falls() has solved it, its fall: what models with the
-/// same fall_model() share. Does not change after that. The motion refers to the chain, so objects
-/// are not copied.
+/// The data that models with equal fall_model() share: a chain, its motion and its fall, which
+/// solve_falls() sets once. Not copied, because the motion refers to the chain.
 class FallenChain {
  public:
   /// Throws InputError when `model` is outside its domain or its dt_fall is above the limit.
   explicit FallenChain(const ModelParameters& model);
 
-  /// As returned by fall_model().
+  /// The fall_model() of its models.
   const ModelParameters& model() const { return model_; }
   const Chain& chain() const { return chain_; }
   const std::shared_ptr<const Motion>& motion() const { return motion_; }
@@ -40,17 +39,14 @@ class FallenChain {
   mutable FallProgress fall_progress_ = 0.0;
 };
 
-/// Whether solve_falls() solves the two falls side by side, so that both take hardly longer than
-/// one.
+/// Whether solve_falls() solves the two falls side by side, in about the time of one.
 bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b);
 
 /// Solves falls, side by side where integrator and shapes allow. Outcomes are in the order of the
-/// chains. A fall has the same bits whatever is solved beside it; one that fails does not affect
-/// the others.
+/// chains. A fall has the same bits alone and beside others, even if others fail.
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains);
 
-/// The same for any models. A model outside its domain has an error as its outcome. Throws
-/// std::bad_alloc if memory is short.
+/// The same for models. The outcome of a model outside its domain is an error.
 std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models);
 
 }  // namespace oblique::solver

@@ -11,9 +11,9 @@
 
 namespace oblique::solver {
 
-/// Calls `task` with 0, 1, ..., count - 1, on up to `threads` threads, the calling thread among
-/// them; on fewer if the system refuses threads. After an exception no further task begins.
-/// Returns, or throws the first exception, when all tasks that began have ended.
+/// Calls `task` with 0, 1, ..., count - 1 on the calling thread and up to `threads` - 1 others; on
+/// fewer if the system refuses threads. After an exception no further task begins, and the
+/// exception is rethrown when all tasks have ended.
 inline void parallel_for(std::size_t count, std::size_t threads,
                          const std::function<void(std::size_t)>& task) {
   std::atomic<std::size_t> next{0};

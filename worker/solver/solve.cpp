@@ -1,29 +1,22 @@
 #include "worker/solver/solve.h"
 
-#include <cstdint>
 #include <exception>
 #include <map>
-#include <memory>
 #include <mutex>
-#include <optional>
-#include <span>
 #include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/lane_contacts.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/reference/solve_contact.h"
 #include "worker/solver/step_choice.h"
 
 namespace oblique::solver {
 
-/// What copies of a Finger share: the model, its steps in contact, and the fall, solved or not.
+/// The data that copies of a Finger share: the model, its steps in contact, and the fall.
 class Finger::Parts {
  public:
-  /// The fall is `fallen`, or comes from `falls`, or without both is solved here.
+  /// Uses the fall `fallen`, or one from `falls`, or solves it if both are empty.
   Parts(const ModelParameters& model, std::shared_ptr<const FallenChain> fallen,
         std::shared_ptr<FallCache> falls)
       : model_(validated(model)),
@@ -37,10 +30,10 @@ class Finger::Parts {
   }
 
   const ModelParameters& model() const { return model_; }
-  /// The chain, whether its fall is solved or not.
+  /// The chain; its fall may not be solved yet.
   const FallenChain& prepared() const { return falling_ ? *falling_ : *fall_.fallen; }
 
-  /// Throws SolveError when the fall has no answer, without solving it again.
+  /// Solves the fall at the first call. Throws SolveError when it has no answer.
   const std::shared_ptr<const FallenChain>& fallen() const {
     std::call_once(fall_once_, [this] {
       if (!fall_.fallen) {
@@ -54,8 +47,7 @@ class Finger::Parts {
   }
   const Fall& fall() const { return fallen()->fall(); }
 
-  /// Steps in the contact. Throws InputError for a value outside its range and for a step that is
-  /// too long.
+  /// Throws InputError for a value outside its range and for a step that is too long.
   ContactSteps steps_for(const Point& point) const {
     validate_point(model_, point.H_m, point.mu, point.e_star);
     return steps_.contact(point.e_star);
@@ -127,7 +119,7 @@ class PointSolver {
     pass_on(std::move(contact));
   }
 
-  /// Solves points, from upcoming_ on, as long as their chains can share lanes.
+  /// Solves upcoming_ and the points after it whose chains can share lanes with it.
   void solve_in_lanes() {
     const auto first = upcoming_->finger.parts();  // owns the chain
     const Chain& shape = first->prepared().chain();
@@ -148,8 +140,8 @@ class PointSolver {
            have_one_shape(upcoming_->finger.parts()->prepared().chain().tables(), chain.tables());
   }
 
-  /// Prepares the contact of a point. The state at touch in it is valid until the next call. If the
-  /// point cannot be solved, passes its error to the sink and returns nothing.
+  /// Prepares a contact, whose state at touch is valid until the next call. If the point cannot be
+  /// solved, passes its error to the sink and returns nothing.
   std::optional<ContactCase> begin(FingerPoint&& point) {
     const Finger::Parts& finger = *point.finger.parts();
     try {
@@ -171,7 +163,7 @@ class PointSolver {
     }
   }
 
-  /// The state at touch, found once for neighbours.
+  /// The state at touch, cached for the points that follow.
   const ChainState& touch_of(const Finger::Parts& finger, double H_m) {
     constexpr std::size_t kMaxTouches = 16;
     if (fallen_ != finger.fallen() || touches_.size() >= kMaxTouches) {
@@ -210,12 +202,12 @@ class PointSolver {
   const FingerPoints& source_;
   const TakeOutcome& sink_;
   const Tracing& tracing_;
-  std::shared_ptr<const FallenChain> fallen_;  ///< the fall that touches_ belong to
+  std::shared_ptr<const FallenChain> fallen_;  ///< fall of the states in touches_
   std::map<double, ChainState> touches_;       ///< by H
-  std::optional<FingerPoint> upcoming_;        ///< taken from the source, not begun
+  std::optional<FingerPoint> upcoming_;        ///< next point of the source
   bool has_ended_ = false;
-  std::optional<FingerPoint> last_;  ///< begun last
-  double last_compression_s_ = 0.0;  ///< its step
+  std::optional<FingerPoint> last_;  ///< the point begun last
+  double last_compression_s_ = 0.0;  ///< step of last_ in compression
   std::map<std::uint64_t, Begun> begun_;
   std::uint64_t next_number_ = 0;
   std::uint64_t group_ = 0;

@@ -2,23 +2,22 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <chrono>
-#include <compare>
 #include <cstdint>
 #include <exception>
 #include <future>
 #include <iterator>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "worker/solver/estimate.h"
 #include "worker/solver/model/errors.h"
-#include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
 #include "worker/solver/parallel_for.h"
 #include "worker/solver/point_runs.h"
@@ -32,8 +31,8 @@ class FingerSource {
   FingerSource(FallCache& falls, PointSource& source, const TakeOutcome& sink)
       : falls_(falls), source_(source), sink_(sink) {}
 
-  /// The next point; nothing at the end. Unless `solves_falls`, nothing also when the point's fall
-  /// is missing: the next call returns that point.
+  /// The next point; nothing at the end. Without `solves_falls` also nothing if the point's fall is
+  /// missing; the next call then returns this point.
   std::optional<FingerPoint> next(bool solves_falls) {
     while (upcoming_ || (upcoming_ = source_.next())) {
       const std::uint64_t number = *upcoming_;
@@ -64,7 +63,7 @@ class FingerSource {
   }
 
  private:
-  /// Fall models of that point and of those after it, without repetitions in a row.
+  /// Fall models of this point and of later ones, without consecutive duplicates.
   std::vector<ModelParameters> models_from(std::uint64_t number) {
     constexpr int kMaxRuns = 4096;
     constexpr std::size_t kMaxFalls = 64;
@@ -85,7 +84,7 @@ class FingerSource {
   PointSource& source_;
   const TakeOutcome& sink_;
   std::optional<std::uint64_t> upcoming_;
-  std::optional<Finger> finger_;  ///< of the point returned last
+  std::optional<Finger> finger_;  ///< finger of the last point
   std::size_t model_ = 0;         ///< number of its model
 };
 
@@ -101,7 +100,7 @@ void solve_points_of_models(PointSource& source, FallCache& falls, bool with_err
     }
     sink(std::move(outcome));
   };
-  // A fall may take long: points under way are finished before a missing one is solved.
+  // A fall may take long, so the points under way are finished before a missing fall is solved.
   while (auto first = fingers.next(true)) {
     const auto next = [&] {
       return first ? std::exchange(first, std::nullopt) : fingers.next(false);
@@ -124,12 +123,11 @@ std::uint64_t points_of_task(std::uint64_t left, std::size_t threads) {
 namespace {
 
 using namespace std::chrono_literals;
-// Together less than 0.2 s, in which a call that is interrupted returns.
+// An interrupted call returns within the sum of these times. It abandons a thread in a long fall.
 constexpr auto kPollInterval = 50ms;
-constexpr auto kLongestJoin = 140ms;  ///< a thread in a long fall takes longer and is abandoned
+constexpr auto kLongestJoin = 140ms;
 
-/// What the threads of one call share. Each thread owns it together with the call, so that an
-/// abandoned thread never uses what the caller has freed.
+/// The data that the threads of one call share. Abandoned threads keep it alive.
 class Work {
  public:
   Work(std::span<const ModelParameters> models, std::span<const ModelPoint> points,
@@ -146,10 +144,20 @@ class Work {
       }
       points_.push_back({point, points_.size()});
     }
-    sort_points();
+    // Neighbours share a fall, a model, the state at touch, and the contact up to the first turn.
+    std::vector<std::uint64_t> fall_of_model;
+    std::ranges::transform(models_, std::back_inserter(fall_of_model), fall_hash);
+    const auto bits = [](double value) {
+      return std::bit_cast<std::uint64_t>(value);
+    };  // orders NaN
+    std::ranges::sort(points_, {}, [&](const Entry& entry) {
+      const auto& [model, point] = entry.point;
+      return std::tuple(fall_of_model[model], model, bits(point.H_m), bits(point.mu),
+                        bits(point.e_star), entry.number);
+    });
   }
 
-  /// Solves points until none is left, on one of the threads.
+  /// Solves points on one of the threads until none is left.
   void solve() {
     Source source(*this);
     try {
@@ -194,13 +202,18 @@ class Work {
     explicit Source(Work& work) : work_(work) {}
 
     std::optional<std::uint64_t> next() override {
-      if (work_.stopped_ || (next_ == end_ && !work_.take_task(next_, end_))) {
-        return std::nullopt;
+      if (next_ == end_) {
+        const std::lock_guard lock(work_.mutex_);
+        next_ = work_.given_;
+        if (next_ < work_.points_.size()) {
+          work_.given_ += points_of_task(work_.points_.size() - next_, work_.threads_);
+        }
+        end_ = work_.given_;
       }
-      return next_++;
+      return work_.stopped_ || next_ == end_ ? std::nullopt : std::optional(next_++);
     }
     ModelPoint point(std::uint64_t number) override {
-      if (work_.stopped_) {  // do not solve its fall
+      if (work_.stopped_) {  // do not solve the fall of this point
         throw SolveError("stopped");
       }
       return work_.points_[number].point;
@@ -222,35 +235,9 @@ class Work {
     std::uint64_t end_ = 0;
   };
 
-  /// Neighbours share a fall, a model, the state at touch, and the contact up to the first turn.
-  void sort_points() {
-    std::vector<std::uint64_t> falls;  // of each model
-    std::transform(models_.begin(), models_.end(), std::back_inserter(falls), fall_hash);
-    std::sort(points_.begin(), points_.end(), [&falls](const Entry& a, const Entry& b) {
-      std::strong_ordering order = falls[a.point.model] <=> falls[b.point.model];
-      order = std::is_eq(order) ? a.point.model <=> b.point.model : order;
-      for (double Point::*const value : {&Point::H_m, &Point::mu, &Point::e_star}) {
-        if (std::is_eq(order)) {
-          order = std::strong_order(a.point.point.*value, b.point.point.*value);  // NaN too
-        }
-      }
-      return std::is_eq(order) ? a.number < b.number : std::is_lt(order);
-    });
-  }
-
-  bool take_task(std::uint64_t& begin, std::uint64_t& end) {
-    const std::lock_guard lock(mutex_);
-    begin = given_;
-    if (given_ < points_.size()) {
-      given_ += points_of_task(points_.size() - given_, threads_);
-    }
-    end = given_;
-    return begin != end;
-  }
-
   const std::vector<ModelParameters> models_;
   std::vector<Entry> points_;
-  const TakeOutcome& take_;  ///< not to be used once stopped
+  const TakeOutcome& take_;  ///< invalid once stopped
   const bool errors_;
   const std::shared_ptr<FallCache> falls_;
   const std::size_t threads_;

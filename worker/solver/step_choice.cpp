@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 
 #include "worker/solver/model/errors.h"
@@ -25,7 +24,7 @@ void check_asked(const char* key, double asked_s, double limit_s) {
   }
 }
 
-/// Ratio of steps at the model's tolerance to those at the default one, for a method of `order`.
+/// Step at the model's tolerance relative to the step at the default one, for a method of `order`.
 double at_tolerance(const ModelParameters& model, double order) {
   return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
 }
@@ -43,7 +42,7 @@ double chosen_fall_s(const Chain& chain, const ModelParameters& model) {
     }
     return model.dt_fall_s;
   }
-  // A looser tolerance changes the contact only, so that models that differ in it share a fall.
+  // A tolerance looser than the default changes only the contact, so that falls are shared.
   if (implicit) {
     return StepChoice::kImplicitFallFraction * std::sqrt(model.lengths_m.back() / model.g_m_s2) *
            std::min(1.0, at_tolerance(model, kGeneralizedAlphaOrder));
@@ -75,6 +74,10 @@ StepChoice::StepChoice(const Chain& chain, const ModelParameters& model)
       tip_inertia_kg_(chain.tip_inertia_kg()),
       compression_limit_s_(limit_s(chain, model.k_N_m * std::max(1.0, 1.0 / model.eta2))),
       chosen_contact_s_(chosen_contact_s(model, tip_inertia_kg_, compression_limit_s_)),
+      shortest_s_(std::max(
+          kShortestContact / static_cast<double>(Contact::kMaxSteps) *
+              std::sqrt(tip_inertia_kg_ / model.k_N_m),
+          std::numeric_limits<double>::epsilon() * std::sqrt(chain.length_m() / model.g_m_s2))),
       fall_s_(chosen_fall_s(chain, model)) {}
 
 ContactSteps StepChoice::contact_limits(double e_star) const {
@@ -82,10 +85,10 @@ ContactSteps StepChoice::contact_limits(double e_star) const {
   return {compression_limit_s_, limit_s(chain_, stiffest_N_m)};
 }
 
-/// `steps`, at most kLongestFraction of the stability limit.
+/// Limits `steps` to kLongestFraction of the stability limit.
 ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const {
-  // A spring at the tip adds at most its stiffness over the tip's inertia to the square of the
-  // highest frequency. This bound is cheap, the frequency itself would be searched for each e*.
+  // A spring at the tip adds at most stiffness/tip inertia to the square of the highest frequency.
+  // This bound is cheap; the frequency itself would need a search for each e*.
   const double tangential_ratio = 1.0 / model_.eta2;
   const double added_N_m = model_.k_N_m * (std::max(1.0 / (e_star * e_star), tangential_ratio) -
                                            std::max(1.0, tangential_ratio));
@@ -96,28 +99,14 @@ ContactSteps StepChoice::stable(const ContactSteps& steps, double e_star) const 
           std::min(steps.restitution_s, longest_s / slower)};
 }
 
-/// Throws SolveError for steps in compression with which Contact::kMaxSteps end before the contact
-/// can, and for steps in which the tip, fallen by about the chain's length, moves by less than the
-/// rounding of its position.
-void StepChoice::check_can_end(double step_s) const {
-  const double length_m = std::accumulate(model_.lengths_m.begin(), model_.lengths_m.end(), 0.0);
-  if (step_s < std::numeric_limits<double>::epsilon() * std::sqrt(length_m / model_.g_m_s2)) {
-    throw SolveError("steps of " + readable_number(step_s) +
-                     " s in contact are too short: the tip moves by less than rounding in them; a "
-                     "longer dt is needed or, with dt = 0, a smaller k (k = " +
-                     exact_number(model_.k_N_m) + " N/m here)");
-  }
-  const double shortest_s = kShortestContact * std::sqrt(tip_inertia_kg_ / model_.k_N_m);
-  if (step_s * static_cast<double>(Contact::kMaxSteps) < shortest_s) {
-    throw SolveError("the contact would take more than " + std::to_string(Contact::kMaxSteps) +
-                     " steps of " + readable_number(step_s) +
-                     " s: dt must be longer (0 chooses a step)");
-  }
-}
-
 ContactSteps StepChoice::contact(double e_star) const {
   ContactSteps steps = without_step_factor(e_star);
-  check_can_end(steps.compression_s);
+  if (steps.compression_s < shortest_s_) {
+    throw SolveError("steps of " + readable_number(steps.compression_s) +
+                     " s in contact are too short: a longer dt is needed or, with dt = 0, a "
+                     "smaller k (k = " +
+                     exact_number(model_.k_N_m) + " N/m here)");
+  }
   if (model_.step_factor == 1.0) {
     return steps;
   }

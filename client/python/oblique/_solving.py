@@ -13,11 +13,11 @@ import numpy.typing as npt
 from ._results import ManyResults, Result, Trace, _core
 
 Number = Union[float, int, "np.floating[Any]", "np.integer[Any]"]
-#: One value, or an expression of other keys, such as "A^2 / (4 * pi)".
+#: A number, or an expression of other keys, such as "A^2 / (4 * pi)".
 Value = Union[Number, str]
 
 _falls = _core.Falls()  # shared by all calls: a model's fall is solved once
-#: Maximum number of threads of a call.
+#: Maximum number of threads per call.
 MOST_THREADS = 1024
 
 

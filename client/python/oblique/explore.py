@@ -38,7 +38,7 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     a value; None and False leave it out. Raises ValueError for wrong usage and RuntimeError for
     other failures, with the sentences of the program.
     """
-    words = [program(), verb, *([study] if study is not None else []), "--format", "json", "--quiet"]
+    words = [program(), verb, "--format", "json", "--quiet", *([] if study is None else [study])]
     for name, value in flags.items():
         flag = "--" + name.replace("_", "-")
         for each in value if isinstance(value, (list, tuple)) else [value]:
@@ -52,27 +52,28 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     return json.loads(ended.stdout)
 
 
+def _column(rows: List[Dict[str, Any]], name: str, kind: Any = float) -> Any:
+    """The values of that name as an array; numbers are NaN for null."""
+    return np.array([row[name] for row in rows], dtype=kind)
+
+
 class Map(Named):
-    """Borders on a plane. ``x``, ``y``, ``width`` (NumPy arrays), ``region_from``, ``region_to`` and
-    ``along`` (arrays of objects) have an entry for each vertex; ``curves`` are arrays of vertex numbers,
-    ``regions`` and ``shifts`` lists of dicts as in the JSON of ``oblique map``."""
+    """Borders on a plane. The arrays ``x``, ``y``, ``width``, ``region_from``, ``region_to`` and
+    ``along`` have an entry for each vertex; ``curves`` are arrays of vertex numbers; ``regions``
+    and ``shifts`` are lists of dicts as in the JSON of ``oblique map``."""
 
 
 def map(study: Optional[str] = None, **flags: Any) -> Map:
     """``oblique map``: ``oblique.map(x="mu=0.05:2", y="H=0.3:1.05", e=1, preset="paper")``."""
     found = run("map", study, **flags)
     vertices = found.pop("vertices")
-
-    def column(name: str, kind: Any) -> Any:
-        return np.array([vertex[name] for vertex in vertices], dtype=kind)
-
     return Map(
-        x=column("x", float),
-        y=column("y", float),
-        width=column("width", float),
-        region_from=column("from", object),
-        region_to=column("to", object),
-        along=column("along", object),
+        x=_column(vertices, "x"),
+        y=_column(vertices, "y"),
+        width=_column(vertices, "width"),
+        region_from=_column(vertices, "from", object),
+        region_to=_column(vertices, "to", object),
+        along=_column(vertices, "along", object),
         curves=[np.array(curve, dtype=np.int64) for curve in found.pop("curves")],
         x_key=found.pop("x"),
         y_key=found.pop("y"),
@@ -83,12 +84,8 @@ def map(study: Optional[str] = None, **flags: Any) -> Map:
 def _with_columns(found: dict[str, Any]) -> Named:
     """The rows of a table as one array for each column, beside the other members."""
     rows = found.pop("rows")
-
-    def column(name: str) -> Any:
-        values = [row[name] for row in rows]
-        return np.array(values, dtype=object if isinstance(values[0], str) else float)
-
-    return Named(**found, **{name: column(name) for name in rows[0]})
+    kinds = {name: object if isinstance(value, str) else float for name, value in rows[0].items()}
+    return Named(**found, **{name: _column(rows, name, kind) for name, kind in kinds.items()})
 
 
 def sensitivity(**flags: Any) -> Named:
@@ -112,31 +109,28 @@ def uncertainty(study: str, **flags: Any) -> Named:
 
 
 class Fit(Named):
-    """A fit. ``names``, ``value``, ``sd``, ``lower_95`` and ``upper_95`` (NumPy arrays; NaN for what the data
-    do not determine) have an entry for each unknown; ``correlation`` is a matrix; ``fitted`` and
-    ``residuals`` (in standard deviations) have an entry for each measured number, and ``rows`` are dicts
-    of these as in the JSON of ``oblique fit``. ``notes`` says what the data leave open."""
+    """A fit. The list ``names`` and the arrays ``value``, ``sd``, ``lower_95`` and ``upper_95``
+    (NaN for what the data do not determine) have an entry for each unknown; ``correlation`` is a
+    matrix. The arrays ``fitted`` and ``residuals`` (in standard deviations) have an entry for each
+    measured number; ``rows`` are its dicts in the JSON of ``oblique fit``. ``notes`` are sentences
+    about what the data leave open."""
 
 
 def fit(measured: str, unknowns: Mapping[str, Sequence[float]], **flags: Any) -> Fit:
-    """``oblique fit``: ``oblique.fit("measured.csv", {"k": (1e7, 1e8)}, sd="1%", preset="paper")``. An
-    unknown has its bounds, and perhaps its start."""
-    texts = [f"{key}={':'.join(repr(float(end)) for end in ends)}" for key, ends in unknowns.items()]
+    """``oblique fit``: ``oblique.fit("measured.csv", {"k": (1e7, 1e8)}, sd="1%", preset="paper")``.
+    An unknown has its bounds, and perhaps its start."""
+    texts = [f"{key}={':'.join(repr(float(v)) for v in ends)}" for key, ends in unknowns.items()]
     found = run("fit", measured, fit=texts, **flags)
     of_unknowns, rows = found.pop("unknowns"), found.pop("residuals")
-
-    def column(objects: List[Dict[str, Any]], name: str) -> Any:
-        return np.array([each[name] for each in objects], dtype=float)
-
     return Fit(
         names=[each["unknown"] for each in of_unknowns],
-        value=column(of_unknowns, "value"),
-        sd=column(of_unknowns, "sd"),
-        lower_95=column(of_unknowns, "lower_95"),
-        upper_95=column(of_unknowns, "upper_95"),
+        value=_column(of_unknowns, "value"),
+        sd=_column(of_unknowns, "sd"),
+        lower_95=_column(of_unknowns, "lower_95"),
+        upper_95=_column(of_unknowns, "upper_95"),
         correlation=np.array(found.pop("correlation"), dtype=float),
-        fitted=column(rows, "fitted"),
-        residuals=column(rows, "residual_sd"),
+        fitted=_column(rows, "fitted"),
+        residuals=_column(rows, "residual_sd"),
         rows=rows,
         **found,
     )

@@ -1,16 +1,16 @@
-// Lines or bars over an axis, drawn by uPlot. Keys move the cursor; a text shows the values there.
+// Draws lines or bars over an axis with uPlot. Keys move the cursor; a text shows its values.
 import { ink } from "./colours.js";
 import { h } from "./dom.js";
 import { shown } from "./format.js";
 import { scale, ticks, tickText } from "./scale.js";
 
 /**
- * The contents of a chart, in shown units: title; x {label, name, unit, values, isLog, ends}; y
- * {label, unit, isLog, ends}; series [{label, values, look, isThick}]; isBars; spans [{from, to,
- * ink, isBand}] behind the lines (a band is at their foot). Callbacks: zoom(part) and select(part),
- * where part is {x: [from, to], y: [from, to] or null}, or null for everything (zoom) or nothing
- * (select); moved(i): the cursor moved to value i. dragSelects: dragging selects, and with Shift
- * zooms; otherwise the reverse.
+ * A chart of lines or bars. Its contents, in shown units: title; x {label, name, unit, values,
+ * isLog, ends}; y {label, unit, isLog, ends}; series [{label, values, look, isThick}]; isBars;
+ * spans [{from, to, ink, isBand}] behind the lines (a band is a strip at the bottom). Callbacks:
+ * zoom(part) and select(part), where part is {x: [from, to], y: [from, to] or null}, or null to
+ * show everything or select nothing; moved(i) when the cursor moves to value i. With dragSelects,
+ * dragging selects and Shift with dragging zooms; without it, the reverse.
  */
 
 // uPlot comes from a classic script, which runs before modules (index.html).
@@ -18,7 +18,7 @@ const { uPlot } = globalThis;
 
 const dashes = [[], [7, 3], [2, 3], [9, 3, 2, 3], [14, 4], [4, 2], [1, 4], [12, 3, 3, 3]];
 const fills = ["bar", "line1"];
-/** With fewer values, points are drawn too. */
+/** A line with fewer values also shows its points. */
 const fewValues = 60;
 const usualHeight = 220;
 
@@ -43,7 +43,7 @@ function legendOf({ series, isBars }) {
   return h("ul.legend", ...entries.map(entry));
 }
 
-/** Properties that cannot change after the chart is drawn. */
+/** Properties that require a new chart when they change. */
 const formOf = ({ title, x, y, series, isBars, spans }) =>
   JSON.stringify([
     [title, isBars, spans, x.label, x.isLog, y],
@@ -51,7 +51,7 @@ const formOf = ({ title, x, y, series, isBars, spans }) =>
     series.map((one) => [one.label, one.look]),
   ]);
 
-/** Ends of the axis. uPlot rounds those of logarithmic axes to powers of ten. */
+/** Ends of the axis. On logarithmic axes uPlot rounds them to powers of ten. */
 function endsOfAxis({ values, ends }, least, most) {
   const isAll = least === values[0] && most === values[values.length - 1];
   const [from, to] = isAll && ends ? ends : [least, most];
@@ -123,11 +123,11 @@ function drawSpans({ ctx, bbox, valToPos }, spans) {
 }
 
 export class Chart {
-  /** Index of the value at the cursor; -1: none. */
+  /** Index of the value at the cursor; -1 if there is none. */
   #at = -1;
   #isQuiet = false;
   #dragZooms = true;
-  /** Created as soon as the element has a width. */
+  /** Created when the element gets a width. */
   #plot = null;
 
   constructor(lines) {
@@ -148,7 +148,7 @@ export class Chart {
     this.watch.observe(this.place);
   }
 
-  /** Shows other values in the same chart. Returns false if a new chart is needed. */
+  /** Shows new contents in the same chart. Returns false if they need a new chart. */
   update(lines) {
     if (!this.#plot || formOf(lines) !== formOf(this.lines)) return false;
     this.lines = lines;
@@ -157,7 +157,7 @@ export class Chart {
     return true;
   }
 
-  /** Moves the cursor to a value without calling `moved`. */
+  /** Moves the cursor to a value; does not call `moved`. */
   pointAt(i) {
     this.#isQuiet = true;
     this.#move(i);
@@ -165,7 +165,7 @@ export class Chart {
     this.#at = i;
   }
 
-  /** The figure for pngOf. */
+  /** Returns the chart as a figure for pngOf. */
   figure() {
     return { title: this.lines.title, canvas: this.#plot.ctx.canvas, legend: this.legend };
   }

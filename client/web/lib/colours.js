@@ -6,7 +6,7 @@ const rgb = (hex) => [0, 2, 4].map((i) => parseInt(hex.slice(i, i + 2), 16));
 
 const packed = ([r, g, b]) => ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
 
-/** 256 pixels, from the smallest to the largest value. */
+/** The colour scale: 256 pixels, from the smallest to the largest value. */
 export const palette = (() => {
   const stops = viridis.split(" ").map(rgb);
   return Uint32Array.from({ length: 256 }, (_, i) => {
@@ -19,8 +19,8 @@ export const palette = (() => {
 export const cssColour = (pixel) =>
   `rgb(${pixel & 255} ${(pixel >> 8) & 255} ${(pixel >> 16) & 255})`;
 
-// Colours and patterns of categories, the same as in `oblique plot`. The last one is for all other
-// categories.
+// Colours and patterns of categories, the same as in `oblique plot`. The last entry is shared by
+// all categories beyond the others.
 const colours = "77aadd eedd88 ee8866 99ddff bbcc33 ffaabb 44bb99 b59a80".split(" ");
 const patterns = [
   () => false,
@@ -41,18 +41,18 @@ const looks = [
   isInked,
 }));
 
-/** The look of all other categories. */
+/** Index of the entry that all categories beyond the others share. */
 export const otherLook = looks.length - 1;
 const mostAtFirst = 12;
 
 /**
- * Assigns looks (colour and pattern) to the categories of a study. A category keeps its look while
+ * Assigns a look (colour and pattern) to each category of a study. A category keeps its look while
  * the page is open.
  */
 export class CategoryLooks {
   #looks = new Map();
 
-  /** Assigns looks to categories that have none: [{text, cells}], most frequent first. */
+  /** Assigns looks to new categories; `categories` is [{text, cells}], most frequent first. */
   assign(categories) {
     const all = categories.reduce((sum, one) => sum + one.cells, 0);
     const most =
@@ -70,7 +70,7 @@ export class CategoryLooks {
   }
 }
 
-/** The pixel at a position in a category's area. */
+/** Returns the pixel at position x, y in the area of a category. */
 export function categoryPixel(look, x, y) {
   const { plain, inked, isInked } = looks[look];
   return isInked(x, y) ? inked : plain;
@@ -79,8 +79,8 @@ export function categoryPixel(look, x, y) {
 export const categoryColour = (look) => cssColour(looks[look].plain);
 
 /**
- * The pixel of a cell without a value. Kinds: missing, failed, left_out, none (no such value),
- * filtered.
+ * Returns the pixel at position x, y in a cell without a value. Kinds: missing, failed, left_out,
+ * none (no such value), filtered.
  */
 export function emptyPixel(why, x, y, isDark) {
   const [ground, line, error] = isDark
@@ -97,7 +97,7 @@ export function emptyPixel(why, x, y, isDark) {
 
 export const isDark = () => matchMedia("(prefers-color-scheme: dark)").matches;
 
-/** A colour of the style sheet, from the class ink-NAME. */
+/** Returns the colour that the style sheet gives to the class ink-NAME. */
 export function ink(name) {
   const probe = document.getElementById("ink");
   probe.className = `ink-${name}`;

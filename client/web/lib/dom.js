@@ -3,9 +3,9 @@
 const attributes = ["role", "for", "list", "scope"];
 
 /**
- * Creates an element "TAG.CLASS...". The optional settings are properties; names that start with
- * "on" are listeners; names with a dash and those in `attributes` are attributes. Children that are
- * null, undefined or false are omitted.
+ * Creates an element "TAG.CLASS...". The optional settings are properties; settings whose names
+ * start with "on" are listeners; those with a dash or in `attributes` are attributes. Children that
+ * are null, undefined or false are omitted.
  */
 export function h(selector, ...given) {
   const [tag, ...classes] = selector.split(".");
@@ -26,7 +26,7 @@ export function h(selector, ...given) {
 
 const isShown = (child) => child !== null && child !== undefined && child !== false;
 
-/** A line for messages: {element, say}. */
+/** Creates a line for messages; returns {element, say}. */
 export function statusLine() {
   const element = h("p.said", { role: "status" });
   const say = (text, isBad = false) => {
@@ -36,14 +36,14 @@ export function statusLine() {
   return { element, say };
 }
 
-/** A field with a label above it; `help` is its tooltip. */
+/** Creates a field with a label above it; `help` is its tooltip. */
 export const labelled = (name, field, help) =>
   h("label.field", { title: help }, h("span", name), field);
 
 export const button = (text, onclick, settings = {}) =>
   h("button", { type: "button", onclick, ...settings }, text);
 
-/** Choices are [value, text, group] or plain values; the group is optional. */
+/** Creates a list to pick from. Choices are [value, text, optional group] or plain values. */
 export function picker(choices, chosen, pick) {
   const select = h("select", { onchange: () => pick(select.value) });
   let parent = select;
@@ -75,7 +75,7 @@ export function copyButton(label, text, settings = {}) {
   return button(label, copy, settings);
 }
 
-/** A command line with a button that copies it; `name` describes its result. */
+/** A command line with a button that copies it; `name` describes what the command gives. */
 export const command = (name, text) =>
   h(
     "div.copied",
@@ -85,12 +85,13 @@ export const command = (name, text) =>
 
 const focusable = "a[href], button, input, select, [tabindex]";
 const containers = ["THEAD", "TBODY", "TR"];
-// Their state is not an attribute, so equal elements may show different values.
+// The state of these elements is not an attribute, so equal elements may show different values.
 const withState = "input, select, canvas";
 
 /**
- * Replaces the children of an element. Equal children are kept, so that a button is not replaced
- * while it is pressed, and the focus stays at its position among the controls.
+ * Replaces the children of an element but keeps equal ones, so that a button is not replaced while
+ * it is pressed. If the focused control is replaced, the control at the same position gets the
+ * focus.
  */
 export function setChildren(element, ...children) {
   const place = [...element.querySelectorAll(focusable)].indexOf(document.activeElement);

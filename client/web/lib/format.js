@@ -1,12 +1,12 @@
-// Numbers, units and command lines as text.
+// Formats numbers, units and command lines as text.
 
-/** An integer with separated thousands. */
+/** Formats an integer with separated thousands. */
 export const count = (value) => Math.round(value).toLocaleString("en").replaceAll(",", "\u202f");
 
-/** "1 point", "12 points". */
+/** Formats a count with its noun: "1 point", "12 points". */
 export const counted = (value, noun) => `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
 
-/** A measured value with `digits` digits. */
+/** Formats a measured value with `digits` digits. */
 export function shown(value, digits = 5) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
@@ -20,8 +20,8 @@ export function shown(value, digits = 5) {
 }
 
 /**
- * The unit in which a column is shown, as in tables of `oblique query`, and the factor from the SI
- * unit.
+ * Returns the unit in which a column is shown (the same as in tables of `oblique query`) and the
+ * factor from the SI unit.
  */
 export function shownUnit(name, unit) {
   const column = name.replace(/^mean of /, "");
@@ -31,14 +31,14 @@ export function shownUnit(name, unit) {
   return [unit === "1" ? "" : (unit ?? ""), 1];
 }
 
-/** A column or axis with its shown unit, which is omitted if the name ends with it. */
+/** Returns the name of a column or axis with its shown unit, unless the name ends with the unit. */
 export function heading(name, unit) {
   const [text, factor] = shownUnit(name, unit);
   const suffix = `_${text.replace("/", "_").replaceAll(" ", "")}`;
   return !text || (factor === 1 && name.endsWith(suffix)) ? name : `${name} [${text}]`;
 }
 
-/** A value in SI units, shown in the unit of its column. */
+/** Formats a value, given in SI units, in the shown unit of its column. */
 export function withUnit(value, name, unit, digits = 5) {
   const [text, factor] = shownUnit(name, unit);
   return typeof value === "number"
@@ -46,7 +46,7 @@ export function withUnit(value, name, unit, digits = 5) {
     : (value ?? "–");
 }
 
-/** Time left, from seconds; null: unknown. */
+/** Formats the remaining time, given in seconds; null means unknown. */
 export function timeLeft(seconds) {
   if (seconds === null) return "";
   if (seconds < 90) return `${Math.ceil(seconds)} s`;
@@ -60,11 +60,11 @@ export function timeLeft(seconds) {
 export const quoted = (text) =>
   /^[A-Za-z0-9_.,:=/@%+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 
-/** The flag of a database file; "" for commands that use the server. */
+/** Returns the flag of a database file, or "" for commands that use the server. */
 export const dbFlag = (file) => (file ? ` --db ${quoted(file)}` : "");
 
 const csvField = (value) =>
   /[",\r\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : String(value ?? "");
 
-/** Rows of values as a CSV file. */
+/** Formats rows of values as a CSV file. */
 export const csv = (rows) => rows.map((row) => `${row.map(csvField).join(",")}\r\n`).join("");

@@ -1,10 +1,10 @@
-// Drawings as a PNG file: canvases below each other, with titles and legends.
+// Saves drawings as a PNG file: canvases one below the other, with titles and legends.
 import { ink } from "./colours.js";
 
 const margin = 12; // CSS pixels
 const lineHeight = 20;
 
-/** Entries of a legend: an optional sign and a text. */
+/** Returns the entries of a legend: an optional sign and a text each. */
 function entriesOf(legend) {
   const found = [...(legend?.querySelectorAll("p, .bar canvas, li") ?? [])];
   return found.map((one) => ({
@@ -14,7 +14,7 @@ function entriesOf(legend) {
   }));
 }
 
-/** Draws a legend below `y`; returns its end. */
+/** Draws a legend below position `y`; returns the position below the legend. */
 function drawLegend(context, legend, y, width) {
   let x = margin;
   for (const { sign, text, isWide } of entriesOf(legend)) {
@@ -34,7 +34,7 @@ function drawLegend(context, legend, y, width) {
   return x > margin ? y + lineHeight : y;
 }
 
-/** Draws figures below each other; returns their end. */
+/** Draws figures one below the other; returns the position below the last. */
 function drawFigures(context, figures, width) {
   let y = margin;
   context.fillStyle = ink("text");
@@ -50,7 +50,10 @@ function drawFigures(context, figures, width) {
   return y;
 }
 
-/** Figures are {title, canvas, legend}; canvas and legend (or null) are elements of the page. */
+/**
+ * Creates a PNG file. Figures are {title, canvas, legend}; canvas and legend are elements of the
+ * page; the legend may be null.
+ */
 export function pngOf(figures) {
   const ratio = window.devicePixelRatio || 1;
   const width = Math.max(...figures.map(({ canvas }) => canvas.clientWidth));

@@ -2,7 +2,7 @@
 
 const identity = (value) => value;
 
-/** Maps `from` to 0 and `to` to 1. */
+/** Creates a scale that maps `from` to 0 and `to` to 1. */
 export function scale(from, to, isLog) {
   const [inner, outer] = isLog ? [Math.log, Math.exp] : [identity, identity];
   const start = inner(from);
@@ -16,7 +16,7 @@ export function scale(from, to, isLog) {
   };
 }
 
-/** The smallest and largest number; null if there is none. */
+/** Returns the smallest and largest finite number, or null if there is none. */
 export function endsOf(values) {
   let [least, most] = [Infinity, -Infinity];
   for (const value of values) {
@@ -27,11 +27,11 @@ export function endsOf(values) {
   return least <= most ? [least, most] : [null, null];
 }
 
-/** About `wanted` round values. */
+/** Returns about `wanted` round values within a range. */
 export function ticks({ from, to, isLog }, wanted) {
   const [least, most] = [Math.min(from, to), Math.max(from, to)];
   const width = most - least;
-  // In a range of a few ulps, adding a step would not change the value.
+  // In a range of a few ulps, adding a step would not change the value and the loop would not end.
   if (!(width < Infinity && width > 1e-12 * Math.max(Math.abs(least), Math.abs(most))))
     return [least];
   if (isLog && most / least >= 8) return logTicks(least, most, wanted);
@@ -63,7 +63,7 @@ export function tickText(value) {
   return text.replaceAll("-", "\u2212");
 }
 
-/** The quantile of ascending numbers. */
+/** Returns the quantile `share` (0 to 1) of ascending numbers. */
 export function quantile(sorted, share) {
   const at = (sorted.length - 1) * share;
   const low = Math.floor(at);

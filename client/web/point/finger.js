@@ -1,6 +1,6 @@
-// The finger during the contact: a side view of the whole finger with enlarged motion, and a view
-// of the tip at the ground with the contact particle P and the forces. A player moves both through
-// time.
+// Shows the finger during the contact: a side view of the whole finger with enlarged motion, and a
+// view of the tip at the ground with the contact particle P and the forces. Both follow the time of
+// a player.
 import { ink } from "../lib/colours.js";
 import { button, h } from "../lib/dom.js";
 import { shown } from "../lib/format.js";
@@ -17,7 +17,7 @@ function lengthText(metres) {
   return metres >= 1e-3 ? `${shown(metres * 1e3, 3)} mm` : `${shown(metres * 1e6, 3)} µm`;
 }
 
-/** An empty canvas that fills its container; null if there is no room. */
+/** Clears a canvas and fits it to its container; returns null if the container has no room. */
 function begin(canvas, place) {
   const width = place.clientWidth;
   if (width < 60) return null;
@@ -55,7 +55,7 @@ function drawGround(context, width, level) {
   context.fillRect(0, level, width, 5);
 }
 
-/** A text with a border in the background colour, so that lines do not cross it. */
+/** Writes a text with a border in the background colour, which separates it from lines behind. */
 function write(context, text, x, y, colour = "text", align = "left") {
   context.textAlign = align;
   context.strokeStyle = ink("page");
@@ -65,7 +65,7 @@ function write(context, text, x, y, colour = "text", align = "left") {
   context.fillText(text, x, y);
 }
 
-/** A scale bar of a round length. */
+/** Draws a scale bar of a round length. */
 function drawLength(context, width, metresPerPixel) {
   const most = width * 0.3 * metresPerPixel;
   const power = 10 ** Math.floor(Math.log10(most));
@@ -90,7 +90,7 @@ function drawArrow(context, [x, y], [dx, dy], colour) {
   context.fill();
 }
 
-/** Converts alternating x and y to pairs of pixels. */
+/** Converts coordinates (alternating x and y) to pairs of pixels. */
 const pixelsOf = (nodes, px, py) =>
   Array.from({ length: nodes.length / 2 }, (_, i) => [px(nodes[2 * i]), py(nodes[2 * i + 1])]);
 
@@ -169,7 +169,7 @@ function tipAtGround(trace) {
     drawGround(context, width, level);
     const past = Array.from({ length: row + 1 }, (_, i) => [px(x[i]), py(y[i])]);
     drawPath(context, past, "weak", 1);
-    // Only the direction of the last element is to scale.
+    // The last element is drawn with its true direction only; its length is not to scale.
     const [nx, ny] = trace.nodes(row).slice(-4);
     const [dx, dy] = [nx - x[row], ny - y[row]];
     const far = width / (Math.hypot(dx, dy) || 1);
@@ -188,7 +188,7 @@ function tipAtGround(trace) {
   return { ...figure, draw };
 }
 
-/** The finger with a player; calls `moved` with each shown row. */
+/** Creates the view of the finger with a player; calls `moved` with each row that it shows. */
 export function fingerOf(trace, moved) {
   const times = trace.column("t_s");
   const last = times.at(-1) || 1e-9;
@@ -245,7 +245,7 @@ export function fingerOf(trace, moved) {
     tip: tip.element,
     whole: whole.element,
     player: h("div.row.player", play, h("span.scrub", slider, output)),
-    /** Plays from touch, unless the reader prefers reduced motion. */
+    /** Plays from touch, unless the browser is set to prefer reduced motion. */
     begin() {
       set(0);
       if (!matchMedia("(prefers-reduced-motion: reduce)").matches) start();

@@ -1,4 +1,4 @@
-// A point: time histories, moving finger, and all numbers.
+// The view of one point: time histories, moving finger, and all numbers.
 import { json, rows, rowsPath } from "../api.js";
 import { Chart } from "../lib/chart.js";
 import { button, command, h, saveFile, statusLine } from "../lib/dom.js";
@@ -24,7 +24,7 @@ const origin =
   );
 const hidden = "study study_id point model_id worker_id worker_name attempt reused_from".split(" ");
 
-/** The values of a list, which a row contains as JSON. */
+/** Parses a list that a row contains as JSON. */
 function listOf(text) {
   try {
     return JSON.parse(text);
@@ -43,7 +43,7 @@ function textOf(value, { name, unit }) {
   return `${list.map(text).join(", ")} ${unit}`;
 }
 
-/** Reads the point with its row, if it has a result. */
+/** Reads the point; if it has a result, also its row. */
 async function readPoint(study, point, signal) {
   const select = study.columns.map((column) => column.name).join(",");
   const [update, answer] = await Promise.all([
@@ -55,7 +55,7 @@ async function readPoint(study, point, signal) {
   return { ...update, row };
 }
 
-/** The main numbers, or why there are none. */
+/** Shows the main numbers, or the reason why there are none. */
 function mainFacts({ row, fault, left_out: isLeftOut, ...point }, columns) {
   const source = row ?? point;
   const known = mainNumbers.filter((name) => source[name] !== undefined && source[name] !== null);
@@ -74,7 +74,7 @@ function mainFacts({ row, fault, left_out: isLeftOut, ...point }, columns) {
   ].filter(Boolean);
 }
 
-/** All numbers of a row in groups; tooltips give their meaning. */
+/** Shows all numbers of a row in groups; tooltips give their meaning. */
 function allNumbers(row, columns) {
   const list = (title, names) => {
     const entry = (column) =>
@@ -98,7 +98,7 @@ function allNumbers(row, columns) {
   ];
 }
 
-/** Charts of the time histories, forces first. `moved` receives the row at the cursor. */
+/** Creates charts of the time histories, forces first. Calls `moved` with the row at the cursor. */
 function chartsOf(trace, moved) {
   const micro = (name) => trace.column(name).map((value) => value * 1e6);
   const change = (name) => {
@@ -155,7 +155,7 @@ function saveTrace(trace, name) {
   saveFile(`${name}.csv`, csv([head, ...Array.from({ length: trace.rows }, row)]));
 }
 
-/** Shows the time histories of a trace; returns the objects to close. */
+/** Shows the time histories of a trace; returns the objects that need closing. */
 function showTrace(place, trace, name) {
   const charts = chartsOf(trace, (row) => finger.show(row));
   const finger = fingerOf(trace, (row) => charts.forEach((chart) => chart.pointAt(row)));
@@ -234,7 +234,7 @@ export async function pointView(root, place, id, point) {
     .then((trace) => open.push(...showTrace(pictures, trace, `${study.name}-${point}`)))
     .catch((error) => signal.aborted || say(`No time histories: ${error.message}`, true));
   return {
-    /** Until the point is solved, reads it again when points of its study are completed. */
+    /** Reads an unsolved point again whenever points of its study are completed. */
     async take(now) {
       const listed = now.studies.find((one) => one.id === id);
       const completedNow = listed ? completed(listed) : -1;
@@ -245,7 +245,7 @@ export async function pointView(root, place, id, point) {
         if (update.row) show();
         done = completedNow;
       } catch {
-        // the next overview tries again
+        // the next overview causes another attempt
       }
       isAsking = false;
     },

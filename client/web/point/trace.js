@@ -1,7 +1,9 @@
-// Time histories of a point's contact as columns.
+// Loads the time histories of a point's contact as columns.
 import { numbers, retryMs } from "../api.js";
 
-/** Whether the request may succeed later: no worker, too many requests, or no answer. */
+/**
+ * Whether a failed request may succeed later: there was no worker, no answer, or too many requests.
+ */
 const isTemporary = (error) => error.isSilence || [409, 503].includes(error.status);
 
 /** Waits until a worker has solved the point again; `say` shows the reason for waiting. */
@@ -20,8 +22,8 @@ export async function loadTrace(study, point, signal, say) {
 }
 
 /**
- * Columns in SI units, nodes (alternating x and y, from the pin) and state of each row, and spans
- * of phases and stick [s].
+ * Splits a trace into columns in SI units; nodes (alternating x and y, from the pin) and state of
+ * each row; and time spans of phases and stick [s].
  */
 function parse({ head, bytes, begin }) {
   const { rows, row_numbers: width } = head;
@@ -55,7 +57,7 @@ function parse({ head, bytes, begin }) {
     column,
     nodes: (row) => all.subarray(row * width + nodes, row * width + nodes + 2 * head.nodes),
     state: (row) => head.states[states[row]],
-    // Bit 1 of a code is restitution, bit 2 is slip.
+    // In a state code, bit 1 means restitution and bit 2 means slip.
     spans: [
       ...spansOf((code) => (code & 1 ? "restitution" : "compression")),
       ...spansOf((code) => (code & 2 ? "" : "stick")),
@@ -63,7 +65,7 @@ function parse({ head, bytes, begin }) {
   };
 }
 
-/** The last row with a time of at most `t`. */
+/** Returns the last row with a time of at most `t`. */
 export function rowAt(times, t) {
   let [low, high] = [0, times.length - 1];
   while (low < high) {

@@ -1,18 +1,18 @@
-// Makes conditions of the query language from parts of a picture.
+// Turns parts of a picture into conditions of the query language.
 import { columnOfAxis } from "./fields.js";
 
-/** Joins conditions with AND; empty ones are left out. */
+/** Joins conditions with AND; omits empty ones. */
 export function joined(...conditions) {
   const given = conditions.filter(Boolean);
   if (given.length < 2) return given[0] ?? "";
   return given.map((one) => (/\bor\b/i.test(one) ? `(${one})` : one)).join(" AND ");
 }
 
-/** A range of a column; a missing or "" end is open. */
+/** Returns the condition for a range of a column; a missing or "" end is open. */
 export const within = (column, from = "", to = "") =>
   joined(from === "" ? "" : `${column} >= ${from}`, to === "" ? "" : `${column} <= ${to}`);
 
-/** The number with the fewest digits between two numbers. */
+/** Returns a number between a and b with as few digits as possible. */
 function shortBetween(a, b) {
   const [least, most] = [Math.min(a, b), Math.max(a, b)];
   for (let digits = 1; digits < 17; ++digits) {
@@ -23,8 +23,8 @@ function shortBetween(a, b) {
 }
 
 /**
- * Rounds an end of a range to 1/500 of the range, or of itself near the lower end of a logarithmic
- * scale.
+ * Rounds an end of a range to about 1/500 of the range; near the lower end of a logarithmic scale
+ * to about 1/500 of the number itself.
  */
 export function rounded(value, width) {
   if (!(width > 0)) return value;
@@ -33,7 +33,10 @@ export function rounded(value, width) {
   return Number((Math.round(value / step) * step).toPrecision(12));
 }
 
-/** The values of a picture axis within a range, ascending; if none, the one nearest its middle. */
+/**
+ * Returns the values of a picture axis within a range, ascending. If there are none, returns the
+ * value nearest to the middle of the range.
+ */
 function valuesIn({ values }, [from, to]) {
   const sorted = Array.from(values).sort((a, b) => a - b);
   const inside = sorted.filter((value) => value >= from && value <= to);
@@ -42,7 +45,10 @@ function valuesIn({ values }, [from, to]) {
   return [sorted.reduce((best, value) => (distance(value) < distance(best) ? value : best))];
 }
 
-/** A range of a picture axis as in the address of the page: ends of bins, or indices of values on the axis. */
+/**
+ * Returns a range of a picture axis as the address of the page gives it: ends of bins, or indices
+ * of values on the axis.
+ */
 export function addressOf(side, range) {
   const width = range[1] - range[0];
   if (side.edges) return range.map((end) => String(rounded(end, width)));
@@ -50,7 +56,7 @@ export function addressOf(side, range) {
   return [Math.min(...numbers), Math.max(...numbers)].map(String);
 }
 
-/** A range of a picture axis as a condition. */
+/** Returns the condition for a range of a picture axis. */
 function partOf(side, range) {
   const column = columnOfAxis(side.name);
   if (side.edges) {
@@ -67,7 +73,7 @@ function partOf(side, range) {
   return within(column, shortBetween(before, sorted[first]), shortBetween(sorted[last], after));
 }
 
-/** The condition for the shown values of a picture axis, if it shows only a part of the values. */
+/** Returns the condition for the shown values of a picture axis, or "" if it shows all values. */
 export function shownPart(side, isZoomed) {
   if (!isZoomed || !side.name) return "";
   return partOf(
@@ -76,7 +82,7 @@ export function shownPart(side, isZoomed) {
   );
 }
 
-/** The conditions that hold for the whole picture: values of other axes, and its block. */
+/** Returns the conditions that hold for the whole picture: values of other axes, and its block. */
 function heldPart(blocks, { head }) {
   const varied = (head.at ?? []).filter((one) => one.of > 1);
   const held = varied.map((one) => `${columnOfAxis(one.key)} = ${one.value}`);
@@ -85,7 +91,7 @@ function heldPart(blocks, { head }) {
   return joined(...held, isOfBlock ? `point >= ${first} AND point < ${first + points}` : "");
 }
 
-/** The condition for the shown lines and a range of their output. */
+/** Returns the condition for the shown lines and a range of their output. */
 function linesPart({ y, z, least, most }, range) {
   const isSome = y.name && !y.isWhole;
   const lines = isSome ? `${columnOfAxis(y.name)} IN (${Array.from(y.values).join(", ")})` : "";
@@ -94,8 +100,8 @@ function linesPart({ y, z, least, most }, range) {
 }
 
 /**
- * The condition for a part of a picture: {x: [from, to], y: [from, to]}. In a picture of lines, y
- * is a range of the output or null.
+ * Returns the condition for a part of a picture: {x: [from, to], y: [from, to]}. In a picture of
+ * lines, y is a range of the output, or null.
  */
 export function conditionOf(blocks, picture, { x, y }, isMap) {
   const upwards = isMap ? partOf(picture.y, y) : linesPart(picture, y);

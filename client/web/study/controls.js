@@ -1,5 +1,4 @@
-// Pickers, sliders and scales of a picture. A choice is written into the address and read from
-// there.
+// Pickers, sliders and scales of a picture. Their state is in the address of the page.
 import { button, checkbox, h, labelled, picker, setChildren } from "../lib/dom.js";
 import { heading, shown, shownUnit, withUnit } from "../lib/format.js";
 import { axisValue, fillIn, varyingAxes } from "./fields.js";
@@ -20,7 +19,9 @@ export function controlsOf(view) {
     view.load();
   }
 
-  /** Draws the same data with other settings; loads data again if it depends on the scale. */
+  /**
+   * Draws the picture with other settings. Loads its data again only if they depend on the scale.
+   */
   function redraw(changes) {
     view.set(changes);
     if (view.field("pic") === "map") view.draw();
@@ -40,7 +41,7 @@ export function controlsOf(view) {
     });
   }
 
-  /** Columns that a picture can show, including the present one. */
+  /** Returns the columns that a picture can show, and always `shownColumn`. */
   function columnChoices(shownColumn, mayBeCategory) {
     const found = view.columns.filter(
       ([name]) => mayBeCategory || view.columnOf(name).picture === "numbers",
@@ -118,7 +119,7 @@ export function controlsOf(view) {
 
   const hasColourBar = () => view.hasMap && view.columnOf(view.field("z"))?.picture === "numbers";
 
-  /** The range of colours in shown units. */
+  /** Creates the fields for the range of the colours, in shown units. */
   function rangeFields() {
     const [, factor] = shownUnit(view.field("z"), view.unitOf(view.field("z")));
     const end = (name) => {

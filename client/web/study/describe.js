@@ -3,7 +3,7 @@ import { count, counted, csv, withUnit } from "../lib/format.js";
 import { emptyTexts } from "./legend.js";
 import { mostDots } from "./picture.js";
 
-/** What a picture shows and leaves out. */
+/** Describes what a picture shows and omits. */
 export function factsOf(view) {
   const { picture } = view;
   const { head, x, y, dots } = picture;
@@ -65,7 +65,7 @@ export function sentenceOf({ x, y, z, head, dictionary, values, whyEmpty }, [col
   return `${place}: ${z.name} ${text}${points && !why ? `, ${points}` : ""}`;
 }
 
-/** The numbers of a picture as CSV in SI units, one line per cell or point. */
+/** Returns the numbers of a picture as CSV in SI units, one line per cell or point. */
 export function csvOf({ x, y, z, dots, dictionary, labels, values, whyEmpty, point }) {
   const text = (code) => (z.isCategory ? (dictionary[code]?.text ?? "") : (code ?? ""));
   if (dots) {

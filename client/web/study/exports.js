@@ -1,4 +1,4 @@
-// The picture as files, the view as a link, and equivalent commands.
+// Exports the picture as files, the view as a link, and both as equivalent commands.
 import { button, command, copyButton, h, saveFile, setChildren } from "../lib/dom.js";
 import { dbFlag, quoted } from "../lib/format.js";
 import { pngOf } from "../lib/png.js";
@@ -6,7 +6,7 @@ import { joined } from "./conditions.js";
 import { csvOf } from "./describe.js";
 import { spanOf } from "./legend.js";
 
-/** Flags of `oblique plot` for the picture of a view. */
+/** Returns the flags of `oblique plot` for the picture of a view. */
 function plotFlags(view) {
   const field = (name) => view.field(name);
   const { head } = view.picture;
@@ -16,7 +16,8 @@ function plotFlags(view) {
     lines: [["lines", field("z")], x, ["by", field("y")]],
     scatter: [
       ["scatter", `${field("x")},${field("y")}`],
-      ["colour", view.picture.z.isCategory ? "" : field("z")], // oblique plot colours only by numbers
+      // `oblique plot` can colour only by numbers.
+      ["colour", view.picture.z.isCategory ? "" : field("z")],
     ],
     histogram: [["histogram", field("x")]],
   }[field("pic")];

@@ -1,13 +1,12 @@
-// Parameters in the address of a study: picture and axes. Missing and unsuitable ones get defaults
-// here.
+// The parameters (fields) in the address of a study: picture and axes.
 
-/** The axes of a grid that have their own values. */
+/** The axes of a grid whose values do not follow from other axes. */
 export const ownAxes = (block) =>
   block.kind === "grid" ? block.axes.filter((axis) => !axis.expression && !axis.distribution) : [];
 
 export const varyingAxes = (block) => ownAxes(block).filter((axis) => axis.values > 1);
 
-/** Value `i` of an axis; undefined: the server did not list it. */
+/** Returns value `i` of an axis, or undefined if the server did not list it. */
 export function axisValue({ list, range }, i) {
   if (list || !range) return list?.[i];
   const { from, to, count, spacing } = range;
@@ -17,19 +16,19 @@ export function axisValue({ list, range }, i) {
   return spacing === "log" ? from * (to / from) ** share : from + share * (to - from);
 }
 
-/** The column in queries for the values of an axis. */
+/** Returns the column in queries that holds the values of an axis. */
 export function columnOfAxis(key) {
   const link = /^length([1-9]\d*)$/.exec(key);
   return key === "E" ? "E_Pa" : link ? `lengths_m[${Number(link[1]) - 1}]` : key;
 }
 
-/** With more lines, a map is clearer. */
+/** Maximum number of lines; with more values a map is clearer. */
 const fewLines = 3;
 const gridPictures = ["map", "lines"];
 const pictures = [...gridPictures, "scatter", "histogram"];
 const mainOutput = "fn_peak_N";
 
-/** Index of the grid with the most points; -1: the study has no grid. */
+/** Returns the index of the grid with the most points, or -1 if the study has no grid. */
 function largestGrid(blocks) {
   const size = (i) => (varyingAxes(blocks[i]).length > 0 ? blocks[i].points : -1);
   const best = blocks.reduce((most, _, i) => (size(i) > size(most) ? i : most), 0);
@@ -42,7 +41,9 @@ function usualAxes(keys) {
   return [x, others.includes("H") ? "H" : others[0]];
 }
 
-/** Columns of a study for pickers: [name, group]; first those that vary, then the main outputs. */
+/**
+ * Returns the columns of a study for pickers, [name, group]: those that vary, then main outputs.
+ */
 export function pickedColumns({ columns, usual_columns: usual, errors }) {
   const isDrawn = (name) => columns.some((one) => one.name === name && one.picture !== "none");
   const status = usual.indexOf("status");
@@ -60,7 +61,7 @@ export function pickedColumns({ columns, usual_columns: usual, errors }) {
   ];
 }
 
-/** Adds defaults to the fields of an address. */
+/** Replaces missing and unsuitable fields of an address by defaults. */
 export function fillIn(fields, study) {
   const is = (name) => fields.get(name) ?? "";
   const columnOf = (name) => study.columns.find((one) => one.name === name);

@@ -1,4 +1,4 @@
-// Legends: a colour bar with its range or a list of categories, and the kinds of empty cells.
+// Legends of pictures: a colour bar or a list of categories, and the kinds of empty cells.
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
 import { count, counted, heading, withUnit } from "../lib/format.js";
@@ -7,7 +7,7 @@ import { drawTicksBelow } from "./map.js";
 
 const barHeight = 44;
 
-/** Kinds of cells without a value. */
+/** Names of the kinds of cells without a value. */
 export const emptyTexts = {
   missing: "not solved",
   failed: "failed",
@@ -16,14 +16,14 @@ export const emptyTexts = {
   filtered: "filtered out",
 };
 
-/** Range of the colours; ends that the address does not give come from the picture. */
+/** Returns the range of the colours. The address gives its ends, or else the picture. */
 export function spanOf(view, { least, most }) {
   const end = (name) => {
     const isNumber = view.field(name) !== "" && Number.isFinite(Number(view.field(name)));
     return isNumber ? Number(view.field(name)) : null;
   };
   const [from, to] = [end("from"), end("to")];
-  // Values of slices and bins have single precision.
+  // Values of slices and bins have single precision, so further digits are noise.
   const [low, high] = [least ?? 0, most ?? 1].map((one) =>
     from === to ? one : Number(one.toPrecision(7)),
   );
@@ -33,7 +33,7 @@ export function spanOf(view, { least, most }) {
   return first <= last ? [first, last] : [last, first];
 }
 
-/** Draws the bar on a canvas of its displayed width. */
+/** Draws the colour bar on a canvas, in its displayed width. */
 function drawBar(canvas, z, { from, to, zLog }) {
   const ratio = window.devicePixelRatio || 1;
   const width = canvas.clientWidth;
@@ -61,7 +61,7 @@ function colourBar({ z }, look) {
   return h("div.bar", h("p", heading(z.name, z.unit)), canvas);
 }
 
-/** A sample of a pattern. */
+/** Creates a sample of a pattern. */
 function swatch(pixel) {
   const canvas = h("canvas", { width: 26, height: 16, class: "swatch", "aria-hidden": "true" });
   const context = canvas.getContext("2d");
@@ -118,7 +118,7 @@ function emptyList({ head }) {
   );
 }
 
-/** The legend of a map or of single points. */
+/** Creates the legend of a map or of single points. */
 export function legendOf({ picture }, look) {
   const { z, least, dots } = picture;
   const isPlain = dots && !dots.z;

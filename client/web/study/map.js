@@ -1,5 +1,5 @@
-// A map on a canvas. Each pixel shows its cell, so axes may be uneven or logarithmic. Single points
-// are drawn individually; keys move from cell to cell.
+// A map on a canvas. Each pixel shows the cell at its place, so axes may be uneven or logarithmic.
+// Single points are drawn one by one. Keys move the chosen cell.
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
 import { heading, shownUnit } from "../lib/format.js";
@@ -10,7 +10,7 @@ const margin = { left: 64, right: 14, top: 10, bottom: 46 };
 const leastDrag = 6; // pixels
 const clickReach = 14;
 
-/** Edges of the cells along a picture axis: {order: of the values, edges: ascending, scale}. */
+/** Returns the cells along a picture axis: {order of the values, ascending edges, scale}. */
 function cellsOf(side, wantsLog) {
   const order = [...side.values.keys()].sort((a, b) => side.values[a] - side.values[b]);
   const sorted = order.map((i) => side.values[i]);
@@ -28,13 +28,13 @@ function cellsOf(side, wantsLog) {
   return { order, edges, scale: scale(edges[0], edges.at(-1), isLog) };
 }
 
-/** The cell at a position from 0 to 1. */
+/** Returns the cell at a position from 0 to 1. */
 function cellAt({ order, edges, scale: { place } }, at) {
   const next = edges.slice(1, -1).findIndex((edge) => place(edge) > at);
   return order[next < 0 ? order.length - 1 : next];
 }
 
-/** The cell of each pixel. */
+/** Returns the cell of each pixel along an axis. */
 function cellOfPixels({ order, edges, scale: { place } }, pixels) {
   const ends = edges.map(place);
   let k = 0;
@@ -44,13 +44,13 @@ function cellOfPixels({ order, edges, scale: { place } }, pixels) {
   });
 }
 
-/** Ends of a cell, from 0 to 1. */
+/** Returns the ends of a cell as positions from 0 to 1. */
 function reachOf({ order, edges, scale: { place } }, i) {
   const k = order.indexOf(i);
   return [place(edges[k]), place(edges[k + 1])];
 }
 
-/** Ticks and their values below an area, where they fit. */
+/** Draws ticks below an area, with values where they fit. */
 export function drawTicksBelow(context, area, of, { name, unit }, most) {
   const [, factor] = shownUnit(name, unit);
   context.font = "12px system-ui, sans-serif";
@@ -97,17 +97,17 @@ function drawAxes(context, area, { x, y }, cells) {
   context.restore();
 }
 
-/** Index of a value among 256 colours. */
+/** Index of a value in the scale of 256 colours. */
 function colourOf({ place }, value) {
   const at = place(value);
   return Number.isNaN(at) ? 0 : Math.min(Math.max(Math.round(at * 255), 0), 255);
 }
 
-/** The middle between a colour and the background. */
+/** Returns the mean of a colour and the background. */
 const pale = (pixel, dark) =>
   (((pixel >>> 1) & 0x7f7f7f) + (dark ? 0x0b0b0b : 0x7f7f7f)) | 0xff000000;
 
-/** The pixels of all cells; unselected cells are pale if some are selected. */
+/** Returns the pixels of all cells. If some cells are selected, the others are pale. */
 function cellImage(picture, look, cells, selected, width, height) {
   const image = new ImageData(width, height);
   const pixels = new Uint32Array(image.data.buffer);
@@ -116,8 +116,8 @@ function cellImage(picture, look, cells, selected, width, height) {
   const dark = colours.isDark();
   const nx = picture.x.values.length;
   const of = scale(look.from, look.to, look.zLog);
-  // Computed once per cell instead of once per pixel: a colour, the look
-  // of a category, or, for an empty cell, -1 minus the index of its kind.
+  // A code for each cell, computed once instead of once per pixel: a colour, the look of a
+  // category, or, for an empty cell, -1 minus the index of its kind.
   const codes = Int32Array.from(picture.values, (value, i) => {
     const why = picture.whyEmpty(i);
     if (why) return -1 - emptyKinds.indexOf(why);
@@ -137,7 +137,7 @@ function cellImage(picture, look, cells, selected, width, height) {
   return image;
 }
 
-/** Draws single points, selected ones above the others. */
+/** Draws single points, the selected ones above the others. */
 function drawDots(context, area, picture, look, cells, selected) {
   const { dots, z } = picture;
   const number = dots.points.length;
@@ -174,7 +174,7 @@ function drawDots(context, area, picture, look, cells, selected) {
   context.restore();
 }
 
-/** The pixel of a pair of values. */
+/** Returns the pixel at a pair of values. */
 const placeOf = (area, cells, x, y) => [
   area.x + cells.x.scale.place(x) * area.w,
   area.y + (1 - cells.y.scale.place(y)) * area.h,
@@ -190,16 +190,16 @@ const steps = {
 };
 
 /**
- * Draws pictures over two axes. Handlers: hover(cell), choose(cell, point or null), open(),
- * zoom(part), select(part).
+ * Draws pictures over two axes and handles pointer and keys. Handlers: hover(cell), choose(cell,
+ * point or null), open(), zoom(part), select(part).
  */
 export class MapCanvas {
   picture = null;
-  chosen = null; // the cell [column, row]
+  chosen = null; // chosen cell as [column, row]
   chosenPoint = null;
   dragSelects = false;
   #hovered = null;
-  #drag = null; // [x, y, to x, to y] in pixels
+  #drag = null; // dragged rectangle [x, y, to x, to y] in pixels
   #area = null;
 
   constructor(handlers) {
@@ -230,8 +230,8 @@ export class MapCanvas {
   }
 
   /**
-   * `look`: from, to, zLog, xLog, yLog, categories (their looks); `selected`: the result of
-   * askSelected.
+   * Draws a picture. `look` is {from, to, zLog, xLog, yLog, categories (their looks)}; `selected`
+   * is the result of askSelected.
    */
   show(picture, look, selected) {
     Object.assign(this, { picture, look, selected });
@@ -276,7 +276,7 @@ export class MapCanvas {
 
   #frame([x, y, width, height], thick) {
     const context = this.top.getContext("2d");
-    // Adds room to the frame of a small cell.
+    // Draws the frame of a small cell at a distance from the cell.
     const grow = Math.max(0, 5 - Math.min(width, height));
     const line = (colour, lineWidth) => {
       context.strokeStyle = colour;
@@ -295,7 +295,7 @@ export class MapCanvas {
     this.#frame([...corner, (x1 - x0) * area.w, (y1 - y0) * area.h], thick);
   }
 
-  /** Draws the parts that change while the pointer moves. */
+  /** Draws the layer that changes while the pointer moves. */
   #drawTop() {
     if (!this.#area) return;
     const context = this.top.getContext("2d");
@@ -317,7 +317,7 @@ export class MapCanvas {
     this.#frame([Math.min(x, toX), Math.min(y, toY), Math.abs(toX - x), Math.abs(toY - y)], 1);
   }
 
-  /** Position of the pointer in the canvas. */
+  /** Returns the position of the pointer in the canvas. */
   #at(event) {
     const box = this.top.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
@@ -331,7 +331,7 @@ export class MapCanvas {
     return [cellAt(this.cells.x, x), cellAt(this.cells.y, y)];
   }
 
-  /** The point nearest to a position; null if none is near. */
+  /** Returns the single point nearest to a position, or null if none is near. */
   #dotAt([left, top]) {
     const { dots } = this.picture;
     let [best, least] = [null, clickReach];
@@ -358,7 +358,7 @@ export class MapCanvas {
 
   #press(event) {
     const at = this.#at(event);
-    // Touch scrolls the page unless it selects.
+    // A touch scrolls the page, except when dragging selects.
     const mayDrag = event.pointerType === "mouse" || this.dragSelects;
     if (event.button !== 0 || !mayDrag || !this.#cellAt(at)) return;
     this.#drag = [...at, ...at];
@@ -386,7 +386,7 @@ export class MapCanvas {
     this.handlers.choose(cell, point);
   }
 
-  /** The values within a rectangle. */
+  /** Returns the ranges of values within a rectangle of pixels. */
   #partOf([x, y, toX, toY]) {
     const area = this.#area;
     const inside = (share) => Math.min(Math.max(share, 0), 1);
@@ -401,7 +401,7 @@ export class MapCanvas {
     };
   }
 
-  /** Half of a side's range around a cell, in values. */
+  /** Returns a range of values around a cell that contains about half of the cells along a side. */
   #around({ order, edges }, i) {
     const k = order.indexOf(i);
     const half = Math.max(Math.floor(order.length / 4), 1);

@@ -1,21 +1,22 @@
-// Data of a picture: slices, bins, single points and medians in one form.
+// Reads the data of a picture: slices, bins, single points and medians, all in one form.
 import { numbers, rows } from "../api.js";
 import { endsOf, quantile, scale } from "../lib/scale.js";
 import { joined, within } from "./conditions.js";
 import { ownAxes } from "./fields.js";
 
 /**
- * A side has name, unit (SI), values, isWhole (the values between the ends are complete), and edges
- * of bins or indices of the values on their axis. A picture has sides x and y; z {name, unit,
- * isCategory} and its range least to most; values by rows (for categories indices into the
- * dictionary [{text, cells}]); the head of the server's answer; point(column, row); whyEmpty(cell):
- * "" or one of emptyKinds; and dots {points, x, y, z} for single points, or labels for lines.
+ * The form of a picture. It has sides x and y. A side has name, unit (SI), values, isWhole (the
+ * values between the ends are complete), and either the edges of bins or the indices of the values
+ * on their axis. The picture also has z {name, unit, isCategory}; `least` and `most`, the range of
+ * z; values by rows (for categories indices into the dictionary [{text, cells}]); the head of the
+ * server's answer; point(column, row); whyEmpty(cell), which returns "" or one of emptyKinds; and
+ * dots {points, x, y, z} for single points, or labels for lines.
  */
 
-/** Kinds of cells without a value, by their bits. */
+/** Kinds of cells without a value, in the order of their bits in the server's answer. */
 export const emptyKinds = ["missing", "failed", "left_out", "none", "filtered"];
 
-/** Maximum number of points drawn one by one; more are grouped in bins. */
+/** Maximum number of points that are drawn one by one; more points are grouped in bins. */
 export const mostDots = 20_000;
 const mostCells = 256; // along each axis
 const firstCells = 96;
@@ -26,14 +27,14 @@ const mostForMedians = 100_000;
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
-/** Indices of the values of an axis that the server shows. */
+/** Returns the indices of the values of an axis that the server sends, `shown` in number. */
 function numbersOf({ first, last }, shown) {
   const steps = Math.max(shown - 1, 1);
   const number = (i) => first + Math.floor((2 * i * (last - first) + steps) / (2 * steps));
   return Array.from({ length: shown }, (_, i) => number(i));
 }
 
-/** One output over one or two axes of a grid. */
+/** Reads a slice: one output over one or two axes of a grid. */
 async function slice(view, query, signal) {
   const { head, bytes, begin } = await ask(view.study.id, "slice", query, signal);
   const { nx, ny } = head;
@@ -71,7 +72,7 @@ async function slice(view, query, signal) {
   };
 }
 
-/** A picture axis of equal bins, or with one bin around a single value. */
+/** Creates a picture axis of equal bins, or of one bin around a single value. */
 function binSide(name, unit, least, most, bins, isLog) {
   if (!(most > least)) {
     const half = Math.abs(least) * 0.05 || 0.5;
@@ -92,13 +93,15 @@ function binSide(name, unit, least, most, bins, isLog) {
 
 const noSide = { name: "", unit: "", values: new Float64Array(1), isWhole: true };
 
-/** The bin of a value. */
+/** Returns the bin that contains a value. */
 function binOf({ edges, values }, value, isLog) {
   const place = scale(edges[0], edges.at(-1), isLog).place(value);
   return Math.min(Math.max(Math.floor(place * values.length), 0), values.length - 1);
 }
 
-/** Number of points by cell over one or two columns, or the mean of a third column. */
+/**
+ * Reads bins over one or two columns: the number of points in each, or the mean of a third column.
+ */
 async function bins(view, query, signal) {
   const { head, bytes, begin } = await ask(view.study.id, "bins", query, signal);
   const side = (of) =>
@@ -128,7 +131,7 @@ async function bins(view, query, signal) {
   };
 }
 
-/** The categories, most frequent first, and the index of each value. */
+/** Returns the categories, most frequent first, and the index of the category of each value. */
 function categoriesOf(values) {
   const cells = new Map();
   for (const text of values) if (text !== null) cells.set(text, (cells.get(text) ?? 0) + 1);
@@ -139,7 +142,7 @@ function categoriesOf(values) {
   return { dictionary, codes: values.map((text) => places.get(text) ?? null) };
 }
 
-/** Single points; null if there are more than mostDots. */
+/** Reads single points; returns null if there are more than mostDots. */
 async function dots(view, signal) {
   const [xName, yName, zName] = ["x", "y", "z"].map((name) => view.field(name));
   const isLog = { x: view.field("xlog") !== "", y: view.field("ylog") !== "" };
@@ -181,7 +184,7 @@ async function dots(view, signal) {
   };
 }
 
-/** Median and quartiles of an output in bins over a column. */
+/** Reads median and quartiles of an output in bins over a column. */
 async function medians(view, signal) {
   const [x, z] = [view.field("x"), view.field("z")];
   const where = joined(shownWhere(view), `${z} IS NOT NULL`);
@@ -214,7 +217,7 @@ async function medians(view, signal) {
   };
 }
 
-/** The filter and the zoomed part of a picture of columns. */
+/** Returns the filter and the zoomed part of a picture of columns as one condition. */
 function shownWhere(view) {
   const part = (name) => within(view.field(name), view.field(`${name}0`), view.field(`${name}1`));
   return joined(view.field("where"), part("x"), view.field("pic") === "scatter" ? part("y") : "");
@@ -239,7 +242,7 @@ function sliceQuery(view, cells) {
 
 function binsQuery(view) {
   const isScatter = view.field("pic") === "scatter";
-  // A few points per bin.
+  // Chooses the number of bins so that each has a few points.
   const side = Math.round(Math.min(Math.max(Math.sqrt(view.study.points / 3), 6), mostBins));
   const z = view.columnOf(view.field("z"))?.picture === "numbers" ? ["z"] : [];
   return {
@@ -257,7 +260,8 @@ async function scatter(view, signal) {
 }
 
 /**
- * Numbers of cells per side, in the order of loading: large maps are first shown with fewer cells.
+ * Returns the maximum numbers of cells per side, in the order of loading. A large map is first
+ * loaded with fewer cells.
  */
 export function stepsTo(view, isRefresh) {
   if (view.field("pic") !== "map" || isRefresh) return [mostCells];
@@ -268,7 +272,7 @@ export function stepsTo(view, isRefresh) {
   return cells > 4 * firstCells ** 2 ? [firstCells, mostCells] : [mostCells];
 }
 
-/** The picture described by the address of a view. */
+/** Reads the picture that the address of a view describes. */
 export function askPicture(view, cells, signal) {
   if (view.field("pic") === "scatter") return scatter(view, signal);
   if (view.field("pic") === "histogram") return bins(view, binsQuery(view), signal);
@@ -276,8 +280,8 @@ export function askPicture(view, cells, signal) {
 }
 
 /**
- * Finds which cells, bins or dots of a picture contain points that meet a further condition:
- * {cells, counts, points}.
+ * Finds the cells, bins or dots of a picture that contain points which meet a further condition.
+ * Returns {cells, counts, points}.
  */
 export async function askSelected(view, picture, condition, signal) {
   const where = joined(view.field("where"), condition);

@@ -1,14 +1,16 @@
-// Submits the part that a map shows as a new study with more values along both axes.
+// Submits the shown part of a map as a new study with more values along both axes.
 import { post } from "../api.js";
 import { button, h, labelled } from "../lib/dom.js";
 import { count } from "../lib/format.js";
 
-/** Steps along an axis are halved, or divided further to get at least this number of values. */
+/** Minimum number of steps along a refined axis, which has at least twice as many as before. */
 const leastSteps = 64;
 
 const integrators = ["explicit", "generalized-alpha"];
 
-/** The model of a recipe; its names end with their units. */
+/**
+ * Returns the model of a recipe in the form that the server expects: names end with their units.
+ */
 function modelOf(model) {
   const nameOf = ({ key, unit }) =>
     unit ? `${key}_${unit.replace("/", "_").replaceAll("^", "")}` : key;
@@ -17,7 +19,7 @@ function modelOf(model) {
   return { ...values, integrator: Math.max(integrators.indexOf(values.integrator), 0) };
 }
 
-/** An axis from the smallest to the largest shown value. */
+/** Returns an axis with more values, from the smallest to the largest shown value. */
 function finerAxis(view, name, axis) {
   const { values } = view.picture[name];
   const { first, last } = view.picture.head[name];
@@ -34,7 +36,10 @@ function finerAxis(view, name, axis) {
   };
 }
 
-/** The axes of the shown block; other axes keep their selected values. */
+/**
+ * Returns the axes of the shown block, of which the shown two have more values. Other axes keep
+ * their selected values.
+ */
 function finerAxes(view) {
   const held = new Map(view.picture.head.at.map((one) => [one.key, one.value]));
   return view.block.axes.map((axis) => {
@@ -45,13 +50,13 @@ function finerAxes(view) {
   });
 }
 
-/** "a-refined", then "a-refined-2". */
+/** Returns "a-refined" for "a", then "a-refined-2", and so on. */
 function nextName(name) {
   const [, base, number = "1"] = /^(.*)-refined(?:-(\d+))?$/.exec(name) ?? [];
   return base === undefined ? `${name}-refined` : `${base}-refined-${Number(number) + 1}`;
 }
 
-/** The button and a field for the name of the new study. */
+/** Creates the button and a field for the name of the new study. */
 export function refineRow(view) {
   const settings = { type: "text", value: nextName(view.study.name), spellcheck: false };
   const name = h("input", { ...settings, autocomplete: "off" });

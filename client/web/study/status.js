@@ -1,4 +1,4 @@
-// Progress of a study, reasons of failures, and its model.
+// Shows the progress of a study, the reasons of failures, and its model.
 import { json, retryMs, rows } from "../api.js";
 import { h, setChildren } from "../lib/dom.js";
 import { count, counted, withUnit } from "../lib/format.js";
@@ -6,11 +6,12 @@ import { completed, failedCondition, progressOf, studyButtons } from "../overvie
 import { axisValue, columnOfAxis } from "./fields.js";
 
 /**
- * With fewer elements per link, forces are off by more than 0.2 %, and a tenth of the modes differ.
+ * Minimum number of elements per link for accurate results. With fewer, forces are off by more than
+ * 0.2 %, and a tenth of the modes differ.
  */
 const enoughElements = 8;
 
-/** The values of an axis in short; `ends` are those of sampled values. */
+/** Describes the values of an axis in short; `ends` is the range of sampled values. */
 function valuesOf(axis, ends) {
   const { key, unit, values, distribution, expression } = axis;
   if (expression) return `${key} = ${expression}`;
@@ -21,7 +22,7 @@ function valuesOf(axis, ends) {
   return `${key} ${listed[0]} to ${text(axisValue(axis, values - 1))} (${count(values)})`;
 }
 
-/** The range of sampled axes in the results: {key: [least, most]}. */
+/** Reads the range of each sampled axis in the results: {key: [least, most]}. */
 async function drawnEnds({ id, blocks }, signal) {
   const keys = blocks[0]?.axes.filter((axis) => axis.distribution).map((axis) => axis.key) ?? [];
   if (keys.length === 0) return {};
@@ -30,7 +31,7 @@ async function drawnEnds({ id, blocks }, signal) {
   return Object.fromEntries(keys.map((key, i) => [key, row.slice(2 * i, 2 * i + 2)]));
 }
 
-/** Axes and mesh of a study; opening it shows the keys of the model. */
+/** Creates a line with axes and mesh of a study. Opening it shows all keys of the model. */
 export function modelLine(study, signal) {
   const { blocks, model } = study;
   const meshAxis = blocks
@@ -55,7 +56,7 @@ export function modelLine(study, signal) {
   return h("details.model", line, h("ul", ...model.map((one) => h("li", textOf(one)))));
 }
 
-/** The reason of the first failure, and a link to all failed points. */
+/** Shows the reason of the first failure, with a link to all failed points. */
 function failureLine(view) {
   const { id } = view.study;
   const element = h("p.failure", { hidden: true });
@@ -79,7 +80,7 @@ function failureLine(view) {
   };
 }
 
-/** State, progress and buttons of a study; calls `moved` when points are completed. */
+/** Shows state, progress and buttons of a study; calls `moved` when points are completed. */
 export function statusRow(view, moved) {
   const { study, place } = view;
   const status = h("div.row.standing");
@@ -129,7 +130,7 @@ export function statusRow(view, moved) {
   ask();
   return {
     element,
-    /** Receives an overview, which may not contain the study. */
+    /** Takes the server's overview, which may not contain this study. */
     take(now) {
       const update = now.studies.find((one) => one.id === study.id);
       const byState = JSON.stringify(now.studies_by_state);

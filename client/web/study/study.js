@@ -1,4 +1,4 @@
-// A study: picture, points, filter, selection and chosen point.
+// The view of a study: picture, points, filter, selection and chosen point.
 import { json, retryMs } from "../api.js";
 import { CategoryLooks } from "../lib/colours.js";
 import { Chart } from "../lib/chart.js";
@@ -18,7 +18,7 @@ import { PointTable } from "./table.js";
 
 const refreshEveryMs = 1500;
 
-/** Colours and patterns of categories, by study and column, kept while the page is open. */
+/** Colours and patterns of categories, by study and column; kept while the page is open. */
 const looksOfColumns = new Map();
 
 function looksOf(study, column) {
@@ -33,7 +33,7 @@ export async function studyView(root, place, id) {
   return new StudyView(root, place, study);
 }
 
-/** Fields for filter and selection, with the server's errors. */
+/** Creates the fields for filter and selection, which also show the server's errors. */
 function conditionFields(view) {
   const field = (name, text, placeholder, help) => {
     const said = h("p", { role: "status", class: "bad said", id: `said-${name}` });
@@ -82,7 +82,7 @@ function conditionFields(view) {
   };
 }
 
-/** The contents of a chart of lines or bars, in shown units. */
+/** Returns the contents for a chart of lines or bars, in shown units. */
 function linesOf(view, picture) {
   const { x, y, z, head, labels } = picture;
   const isBars = view.field("pic") === "histogram";
@@ -147,7 +147,7 @@ const orderOf = ({ values }) => [...values.keys()].sort((a, b) => values[a] - va
 
 export class StudyView {
   picture = null;
-  /** The selected cells or points of the picture, as from askSelected. */
+  /** The selected cells or points of the picture, as askSelected returns them. */
   selected = null;
   #asked = null;
   #askedSelected = null;
@@ -201,7 +201,7 @@ export class StudyView {
       h("section", h("h2", "Export"), this.exports),
     );
     this.#showAddress();
-    // Requested after picture and table, because the server answers in order.
+    // The server answers in order, so this request follows those of picture and table.
     this.status.element.after(modelLine(study, place.signal));
   }
 
@@ -209,7 +209,7 @@ export class StudyView {
     return this.fields.get(name) ?? "";
   }
 
-  /** Changes fields of the address. The browser's Back undoes a step. */
+  /** Changes fields of the address. With `isStep`, the browser's Back undoes the change. */
   set(changes, isStep = false) {
     for (const [name, value] of Object.entries(changes)) {
       if (value === "") this.fields.delete(name);
@@ -218,7 +218,7 @@ export class StudyView {
     this.place.keep(this.fields, isStep);
   }
 
-  /** The block of the grid in the picture; undefined: the picture is of columns. */
+  /** The block of the grid in the picture; undefined if the picture is not of a grid. */
   get block() {
     const isOfGrid = ["map", "lines"].includes(this.field("pic")) && this.field("block") !== "";
     return isOfGrid ? this.study.blocks[Number(this.field("block"))] : undefined;
@@ -226,13 +226,13 @@ export class StudyView {
   get hasMap() {
     return ["map", "scatter"].includes(this.field("pic"));
   }
-  /** Whether the address gives the range of the colours or of the axis of lines. */
+  /** Whether the address gives a range for the colours or for the axis of lines. */
   get hasSpan() {
     return ["from", "to"].some(
       (end) => this.field(end) !== "" && Number.isFinite(Number(this.field(end))),
     );
   }
-  /** Indices of the values of fixed axes. */
+  /** Returns the selected value of each fixed axis, as index by key. */
   places() {
     const held = this.field("at")
       .split(",")
@@ -249,13 +249,13 @@ export class StudyView {
   pointAddress(point) {
     return `#/study/${this.study.id}/point/${point}`;
   }
-  /** The zoomed part of the picture as conditions on x and y. */
+  /** Returns the conditions on x and y for the zoomed part of the picture. */
   shownParts() {
     if (!this.picture) return [];
     return ["x", "y"].map((name) => shownPart(this.picture[name], this.field(`${name}0`) !== ""));
   }
 
-  /** Shows another address of the same study. */
+  /** Shows the picture that another address of the same study describes. */
   goTo(fields) {
     this.fields = fields;
     fillIn(this.fields, this.study);
@@ -287,7 +287,7 @@ export class StudyView {
     this.#chart?.close();
   }
 
-  /** Shows an error; the server's error about a condition is shown beside it. */
+  /** Shows an error. The server's error about a condition appears beside the condition's field. */
   complain(error, condition = "") {
     if (error.isSilence) {
       if (!this.#isStale) setTimeout(() => this.reconnected(), retryMs);
@@ -300,7 +300,7 @@ export class StudyView {
     }
   }
 
-  /** Loads picture and table again after new results; one refresh at a time. */
+  /** Loads picture and table again after new results. Only one refresh runs at a time. */
   async #refresh() {
     this.#isOld = true;
     if (this.#isRefreshing) return;
@@ -317,8 +317,8 @@ export class StudyView {
   }
 
   /**
-   * Loads the picture. A running request is cancelled or awaited, so that pictures appear while a
-   * slider moves.
+   * Loads the picture. With `waits`, the running request is completed first; otherwise it is
+   * cancelled, so that pictures appear while a slider moves.
    */
   async load({ waits = false, isRefresh = false } = {}) {
     if (this.#asked && waits) {
@@ -356,7 +356,7 @@ export class StudyView {
     this.draw();
     this.#showChoice();
     this.refine.offer();
-    this.table.load(); // if another part is shown
+    this.table.load(); // loads only if another part is shown
   }
 
   draw() {
@@ -413,11 +413,11 @@ export class StudyView {
     if ("where" in conditions) this.load();
     else this.#loadSelected();
   }
-  /** Selects the points that meet a condition; null: none. */
+  /** Selects the points that meet a condition; null selects none. */
   select(condition) {
     if ((condition ?? "") !== this.field("mark")) this.change({ mark: condition ?? "" });
   }
-  /** Selects the points in a part of the picture; null: none. */
+  /** Selects the points in a part of the picture; null selects none. */
   selectPart(part) {
     const { picture, study, hasMap } = this;
     this.select(part && picture ? conditionOf(study.blocks, picture, part, hasMap) : null);
@@ -440,7 +440,7 @@ export class StudyView {
     }
   }
 
-  /** Zooms to a part of the picture; null: shows all. */
+  /** Zooms to a part of the picture; null shows all of it. */
   zoom(part) {
     const { picture } = this;
     if (!picture) return;
@@ -449,7 +449,7 @@ export class StudyView {
     if (!part && isLines) Object.assign(zoomed, { from: "", to: "" });
     if (part) {
       [zoomed.x0, zoomed.x1] = addressOf(picture.x, part.x);
-      if (!this.hasMap && zoomed.x0 === zoomed.x1) return; // a single value is no line
+      if (!this.hasMap && zoomed.x0 === zoomed.x1) return; // a single value gives no line
       if (this.hasMap) [zoomed.y0, zoomed.y1] = addressOf(picture.y, part.y);
       const width = part.y ? part.y[1] - part.y[0] : 0;
       if (isLines && part.y)
@@ -465,7 +465,7 @@ export class StudyView {
       cell && this.picture && !this.picture.dots && cell[0] < this.picture.x.values.length;
     this.reading.textContent = isThere ? sentenceOf(this.picture, cell) : "";
   }
-  /** Chooses a point: marks it in picture and table and offers to open it. */
+  /** Chooses a point: marks it in picture and table, and shows a link that opens it. */
   choose(point, cell = this.#cellOf(point)) {
     this.map.choose(cell, this.picture?.dots ? point : null);
     this.#speak(cell);
@@ -478,7 +478,7 @@ export class StudyView {
     if (this.field("cell")) this.choose(Number(this.field("cell")));
     else if (!this.map.chosen || this.picture.x.edges) this.choose(null, null);
   }
-  /** The cell of a point in the picture; null: none. */
+  /** Returns the cell of a point in the picture, or null. */
   #cellOf(point) {
     const { picture } = this;
     if (!picture || point === null) return null;

@@ -1,4 +1,4 @@
-// The points of a study that meet the filter and the selection and lie in the shown part, in pages.
+// The table of the shown points, in pages: those in the shown part that meet filter and selection.
 import { rows, rowsPath } from "../api.js";
 import { button, h, setChildren } from "../lib/dom.js";
 import { count, heading, shown, shownUnit } from "../lib/format.js";
@@ -34,7 +34,7 @@ export class PointTable {
     });
   }
 
-  /** Columns of the table: those that vary, those of the picture, the main outputs. */
+  /** Returns the columns of the table: those that vary, those of the picture, the main outputs. */
   columns() {
     const { view } = this;
     const usual = view.study.usual_columns;
@@ -53,7 +53,7 @@ export class PointTable {
     return joined(this.view.field("where"), this.view.field("mark"), ...this.view.shownParts());
   }
 
-  /** Loads the page of the address if the query or the results have changed. */
+  /** Loads the page that the address gives, if the query or the results have changed. */
   async load(isRefresh = false) {
     const { view } = this;
     const page = Math.min(Math.max(Math.floor(Number(view.field("page"))) || 1, 1), mostPages);
@@ -96,7 +96,7 @@ export class PointTable {
     this.#query = "";
     if (!error.isSilence) this.table.replaceChildren();
     this.said.textContent = "";
-    // An error in a condition is shown beside its field.
+    // The study shows an error in a condition beside the condition's field.
     const isOfCondition =
       error.status === 400 && (this.view.field("where") || this.view.field("mark"));
     if (!isOfCondition) this.view.complain(error);
@@ -142,11 +142,11 @@ export class PointTable {
     this.view.set({ page: page > 1 ? String(page) : "" });
     this.load();
   }
-  /** Sorts by a column: ascending, descending, then by point again. */
+  /** Sorts by a column: ascending, at the next call descending, then by point again. */
   #sort(name) {
     const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });
     this.load();
-    this.view.draw(); // the commands contain the order
+    this.view.draw(); // the shown commands contain the order
   }
 }

@@ -1,13 +1,13 @@
 # Converts deploy/CHANGELOG.md to Debian's changelog format.
 find_program(GZIP gzip REQUIRED)
 
-# debian_date(VARIABLE DATE): "2026-11-22" as "Sun, 22 Nov 2026 00:00:00 +0000".
+# debian_date(VARIABLE DATE): formats "2026-11-22" as "Sun, 22 Nov 2026 00:00:00 +0000".
 function(debian_date variable date)
   string(REGEX MATCH "^([0-9]+)-0?([0-9]+)-0?([0-9]+)$" whole "${date}")
   set(year ${CMAKE_MATCH_1})
   set(month ${CMAKE_MATCH_2})
   set(day ${CMAKE_MATCH_3})
-  # Sakamoto's method: the year begins in March.
+  # Finds the day of the week by Sakamoto's method, in which the year begins in March.
   set(shifts 0 3 2 5 0 3 5 1 4 6 2 4)
   set(days Sun Mon Tue Wed Thu Fri Sat)
   set(months Jan Feb Mar Apr May Jun Jul Aug Sep Oct Nov Dec)
@@ -26,10 +26,10 @@ function(debian_date variable date)
   set(${variable} "${day_name}, ${day} ${month_name} ${year} 00:00:00 +0000" PARENT_SCOPE)
 endfunction()
 
-# debian_changelog(VARIABLE PACKAGE): all numbered versions of CHANGELOG.md, newest first.
+# debian_changelog(VARIABLE PACKAGE): converts all numbered versions of CHANGELOG.md, newest first.
 function(debian_changelog variable package)
   file(READ "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../../CHANGELOG.md" text)
-  # CMake splits lists at semicolons outside brackets.
+  # Replaces semicolons, at which CMake would split the text as a list.
   string(ASCII 31 semicolon)
   string(REPLACE ";" "${semicolon}" text "${text}")
   string(REGEX REPLACE "\n## \\[([0-9][^]]*)\\] - ([0-9-]+)" "\n## \\1 \\2" text "${text}")
@@ -57,7 +57,7 @@ function(debian_changelog variable package)
     elseif(open AND line MATCHES "^  (.*)$")
       string(APPEND changelog "    ${CMAKE_MATCH_1}\n")
     elseif(open AND NOT line STREQUAL "")
-      # Sentences before the first list become an entry.
+      # Sentences before the first list become an entry of their own.
       if(before_was_text)
         string(APPEND changelog "    ${line}\n")
       else()

@@ -2,7 +2,7 @@
 # that it runs without installed libraries and without root.
 set(tree "${CPACK_TEMPORARY_INSTALL_DIRECTORY}")
 set(programs "${tree}/bin/oblique-server" "${tree}/bin/oblique-worker" "${tree}/bin/oblique")
-# For a Python of the same version.
+# The Python module in the archive works only with the same version of Python.
 file(GLOB module "${tree}/lib/python3/dist-packages/oblique/_core*.so")
 file(GET_RUNTIME_DEPENDENCIES EXECUTABLES ${programs} MODULES ${module}
      RESOLVED_DEPENDENCIES_VAR libraries UNRESOLVED_DEPENDENCIES_VAR missing
@@ -16,7 +16,7 @@ find_program(PATCHELF patchelf)
 if(NOT PATCHELF)
   message(FATAL_ERROR "the archive needs patchelf, which sets the programs' library path")
 endif()
-# RPATH instead of RUNPATH, because it also applies to libraries of libraries.
+# Sets RPATH instead of RUNPATH, because RPATH also applies to the libraries that libraries need.
 execute_process(COMMAND ${PATCHELF} --force-rpath --set-rpath "$ORIGIN/../lib/oblique" ${programs}
                 COMMAND_ERROR_IS_FATAL ANY)
 if(module)
@@ -29,7 +29,7 @@ find_program(DPKG_QUERY dpkg-query)
 foreach(library IN LISTS libraries)
   file(REAL_PATH "${library}" file)
   set(candidates "${file}")
-  # Debian's packages list files under /lib, before it became a part of /usr.
+  # Debian's packages still list files under /lib, which is now a part of /usr.
   string(REGEX REPLACE "^/usr" "" without_usr "${file}")
   set(package "")
   foreach(candidate "${file}" "${without_usr}" "/usr${file}")

@@ -1,5 +1,5 @@
-# Run by cpack after installing into a package's tree and before packing: adds files for this kind
-# of package.
+# cpack runs this file after installing files into a package's tree and before packing. It adds
+# files that only this kind of package needs.
 include(${CMAKE_CURRENT_LIST_DIR}/../../../proto/program/manual/compress_pages.cmake)
 if(CPACK_GENERATOR STREQUAL "DEB")
   include(${CMAKE_CURRENT_LIST_DIR}/add_changelog.cmake)

@@ -1,10 +1,10 @@
 # Moves the library to the folder of its architecture, as Debian's Multi-Arch requires, and updates
-# the development files. Also writes the information for dpkg-shlibdeps and the trigger of ldconfig;
-# cpack's own would call ldconfig.
+# the development files. Also writes the information for dpkg-shlibdeps and the trigger of ldconfig,
+# because the scripts that cpack generates would call ldconfig.
 set(lib usr/${CPACK_OBLIQUE_LIBDIR})
 set(multiarch usr/lib/${CPACK_OBLIQUE_MULTIARCH})
 
-# change(FILE WHAT INTO): replaces every WHAT, which must exist.
+# change(FILE WHAT INTO): replaces every WHAT in FILE by INTO. Fails if FILE does not contain WHAT.
 function(change file what into)
   file(READ "${file}" text)
   string(FIND "${text}" "${what}" at)
@@ -26,7 +26,7 @@ if(NOT lib STREQUAL multiarch)
   endforeach()
   file(GLOB targets "${development}/${multiarch}/cmake/oblique/oblique-targets-*.cmake")
   change("${targets}" "\${_IMPORT_PREFIX}/${CPACK_OBLIQUE_LIBDIR}/" "\${_IMPORT_PREFIX}/lib/${CPACK_OBLIQUE_MULTIARCH}/")
-  # One folder deeper.
+  # The CMake files are now one folder deeper, so the prefix is one folder further up.
   set(up "get_filename_component(_IMPORT_PREFIX \"\${_IMPORT_PREFIX}\" PATH)\nif(")
   change("${development}/${multiarch}/cmake/oblique/oblique-targets.cmake" "${up}"
          "get_filename_component(_IMPORT_PREFIX \"\${_IMPORT_PREFIX}\" PATH)\n${up}")

@@ -1,4 +1,4 @@
-# Sorts the files of an archive by name; cpack uses the order on the disk, which varies.
+# Sorts the files of an archive by name. cpack would use the order on the disk, which varies.
 if(NOT CPACK_GENERATOR STREQUAL "TGZ")
   return()
 endif()

@@ -1,4 +1,4 @@
-# Run by cpack: compresses manual pages, without times or names in the result.
+# Compresses manual pages when cpack runs it. The results contain no times or names.
 find_program(GZIP gzip REQUIRED)
 file(GLOB found "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/share/man/man1/*.1"
      "${CPACK_TEMPORARY_INSTALL_DIRECTORY}/*/usr/share/man/man1/*.1")

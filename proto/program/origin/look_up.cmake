@@ -1,11 +1,13 @@
-# Writes origin.cpp with the commit from the file `commit` in a source archive, else from git, else
-# empty. It contains no build time, so that the same tree gives the same bytes.
+# Writes origin.cpp with the commit. The commit comes from the file `commit` of a source archive,
+# else from git; else it is empty. The file contains no build time, so that the same tree gives the
+# same bytes.
 set(COMMIT "")
 set(COMMITTED_ON "")
 set(WITH_CHANGES false)
 
-# git_says(VARIABLE ARGUMENT...): sets VARIABLE to the output of git, empty on failure. Ignores
-# variables of a git hook, which would name another tree, and the owner of the folder.
+# git_says(VARIABLE ARGUMENT...): sets VARIABLE to the output of git, or to an empty text if git
+# fails. Ignores the variables of a git hook, because they would name another tree, and ignores who
+# owns the folder.
 function(git_says variable)
   execute_process(
     COMMAND ${CMAKE_COMMAND} -E env --unset=GIT_DIR --unset=GIT_WORK_TREE --unset=GIT_INDEX_FILE
@@ -21,7 +23,7 @@ endfunction()
 file(STRINGS "${CMAKE_CURRENT_LIST_DIR}/commit" known LIMIT_COUNT 1)
 set(commit_and_date "^([0-9a-f]+) ([0-9]+-[0-9]+-[0-9]+)$")
 if(NOT known MATCHES "${commit_and_date}")
-  # A source folder inside another repository has no commit of its own.
+  # A source folder that is a part of another repository has no commit of its own.
   git_says(is_top rev-parse --is-inside-work-tree)
   git_says(above rev-parse --show-prefix)
   if(is_top STREQUAL "true" AND above STREQUAL "")

@@ -4,19 +4,19 @@
 
 namespace oblique::protocol {
 
-/// The source and build of a program.
+/// The source from which a program was built, and its build.
 struct Origin {
   std::string version;        ///< "0.2.0"
-  std::string commit;         ///< first 12 digits; empty: unknown
+  std::string commit;         ///< the first 12 digits of the commit; empty if unknown
   std::string committed_on;   ///< "2026-11-20"; empty: unknown
-  bool with_changes = false;  ///< the tree had uncommitted changes
+  bool with_changes = false;  ///< true if the tree had uncommitted changes
   std::string compiler;       ///< "GCC 12.2.0"
   std::string build_type;  ///< "Release", or with sanitizers "RelWithDebInfo, sanitizers: thread"
 };
 
 Origin origin();
 
-/// The text that `--version` prints after the program's name: "0.2.0 (commit 0123456789ab,
+/// Returns the text that `--version` prints after the program's name: "0.2.0 (commit 0123456789ab,
 /// 2026-11-20)", "0.2.0 (commit 0123456789ab with changes, 2026-11-20)" or "0.2.0 (commit
 /// unknown)".
 std::string version_and_commit();

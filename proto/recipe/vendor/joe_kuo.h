@@ -48,15 +48,15 @@
 
 namespace oblique::sampling {
 
-/// The polynomial x^s + a_1 x^(s-1) + ... + a_(s-1) x + 1, whose inner coefficients are the bits of
-/// `a`, and the odd numbers m_1 ... m_s, of which m_k is below 2^k.
+/// One dimension: the polynomial x^s + a_1 x^(s-1) + ... + a_(s-1) x + 1, whose inner coefficients
+/// are the bits of `a`, and the odd numbers m_1 ... m_s. Each m_k is below 2^k.
 struct Direction {
   std::uint8_t s;
   std::uint16_t a;
   std::array<std::uint16_t, 7> m;
 };
 
-/// Of dimensions 2, 3, ...
+/// Values for the dimensions 2, 3, ...
 inline constexpr std::array<Direction, 31> kJoeKuo{{
     {1, 0, {1}},
     {2, 1, {1, 3}},

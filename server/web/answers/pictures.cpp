@@ -1,4 +1,4 @@
-// Pictures: slices (values on a grid) and bins (counts and averages).
+// Pictures for the page: slices (values on a grid) and bins (counts and averages).
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -38,8 +38,8 @@ double real_of(const protocol::Cell& cell) {
   return cell.kind == protocol::CellKind::kInteger ? static_cast<double>(cell.integer) : cell.real;
 }
 
-/// The column that a field names. Throws std::invalid_argument unless it is numeric or, where
-/// allowed, a category.
+/// Returns the column that a field names. Throws std::invalid_argument unless it is numeric or, if
+/// `may_be_category`, a category.
 PictureColumn picture_column(const FieldReader& fields, const std::string& name,
                              bool may_be_category) {
   const std::string text = fields.text(name).value_or("");
@@ -56,7 +56,7 @@ PictureColumn picture_column(const FieldReader& fields, const std::string& name,
 
 constexpr std::uint64_t kUsualCells = 256;
 
-/// The axis of that key; null if the block has none with listed or ranged values.
+/// Returns the axis of that key; null if the block has no such axis with listed or ranged values.
 const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key) {
   const auto axis = std::ranges::find_if(axes, [key](const AxisLayout& layout) {
     return layout.axis->key() == key && protocol::has_own_values(*layout.axis);
@@ -64,12 +64,12 @@ const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key
   return axis == axes.end() ? nullptr : &*axis;
 }
 
-/// One axis of a slice, with the shown values.
+/// One axis of a slice, and the values of it that are shown.
 struct Side {
-  const AxisLayout* axis = nullptr;  ///< null: the slice is a line
-  std::uint64_t first = 0;           ///< index of the first value in the selected part
+  const AxisLayout* axis = nullptr;  ///< null for the second axis of a slice that is a line
+  std::uint64_t first = 0;           ///< index of the first value in the requested part of the axis
   std::uint64_t last = 0;
-  std::vector<std::uint64_t> numbers = {0};  ///< indices of the shown values, ascending
+  std::vector<std::uint64_t> numbers = {0};  ///< ascending indices of the shown values
   std::vector<double> values = {};           ///< the shown values
 
   std::uint64_t stride() const { return axis == nullptr ? 0 : axis->stride; }
@@ -83,8 +83,7 @@ struct Side {
   }
 };
 
-/// Selects the values to show along the side `name`: all, or evenly spaced ones including both
-/// ends.
+/// Selects the values to show along the side `name`: all, or evenly spaced ones with both ends.
 Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::string& name) {
   Side side{&axis};
   side.first = fields.whole(name + "0").value_or(0);
@@ -106,7 +105,7 @@ Side side_of(const AxisLayout& axis, const FieldReader& fields, const std::strin
   return side;
 }
 
-/// Parses `at`: the indices at which the other axes are fixed, by key.
+/// Parses the field `at`: the index of the fixed value of each axis that the slice does not show.
 std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& axes,
                                                  const std::string& at) {
   std::map<std::string, std::uint64_t> held;
@@ -129,7 +128,7 @@ std::map<std::string, std::uint64_t> held_values(const std::vector<AxisLayout>& 
   return held;
 }
 
-/// A plane, or a line, through the points of a product block.
+/// A plane or a line through the points of a product block.
 struct Grid {
   Grid(const protocol::PointTable& table, const FieldReader& fields);
 
@@ -137,8 +136,8 @@ struct Grid {
   std::vector<AxisLayout> axes;
   Side x;
   Side y;
-  ordered_json at = ordered_json::array();  ///< the fixed axes
-  std::uint64_t first_point;                ///< point at the first values of both axes
+  ordered_json at = ordered_json::array();  ///< the fixed axes, as JSON
+  std::uint64_t first_point;                ///< number of the point at the first value of both axes
 };
 
 Grid::Grid(const protocol::PointTable& table, const FieldReader& fields)
@@ -178,13 +177,13 @@ Grid::Grid(const protocol::PointTable& table, const FieldReader& fields)
   }
 }
 
-/// Why a cell has no value. Encoded in numbers as the NaN with the bits kNan + mark, in categories
-/// as the code 0xffff - mark.
+/// Why a cell has no value. A numeric cell then is the NaN with the bits kNan + mark; a cell of a
+/// category has the code 0xffff - mark.
 enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFiltered, kHasValue };
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// The offset in point numbers of each cell along a side, as a JSON array.
+/// Returns a JSON array of `first` plus the offset in point numbers of each cell along a side.
 std::string offsets_json(const Side& side, std::uint64_t first) {
   std::vector<std::uint64_t> offsets;
   for (const std::uint64_t number : side.numbers) {
@@ -214,12 +213,13 @@ class SliceAnswer : public StudyAnswer {
   const Fields fields_;
   const PictureColumn column_;
   std::optional<Grid> grid_;
-  // points and their cells, by rising point
+  // numbers of the points with their cells, in ascending order
   std::vector<std::pair<std::uint64_t, std::size_t>> points_;
-  std::size_t next_point_ = 0;  // index of the first point that the next row can have
+  std::size_t next_point_ = 0;  // index in `points_` at which the search for the next row begins
   std::vector<Mark> marks_;     // marks of the cells, row by row
   std::vector<float> numbers_;  // values of the cells in a numeric column
-  std::map<std::string, std::vector<std::size_t>> places_;  // cells by text in a category column
+  // indices of the cells with each text of a category column
+  std::map<std::string, std::vector<std::size_t>> places_;
 };
 
 StudyAnswer::Next SliceAnswer::next(const ServedStudy& study) {
@@ -246,7 +246,7 @@ void SliceAnswer::list_points() {
   numbers_.resize(points_.size());
 }
 
-/// Selects point, value and mark of cells with a row. SQLite looks up each point by key.
+/// Selects point, value and mark of all cells that have a row. SQLite looks up each point by key.
 protocol::StudyQuery SliceAnswer::query() const {
   protocol::StudyQuery query;
   query.add_select("point");
@@ -322,8 +322,8 @@ std::vector<std::uint32_t> SliceAnswer::number_bits() const {
   return bits;
 }
 
-/// Returns the codes of the cells and adds their dictionary to `head`. Texts are sorted by falling
-/// frequency, then alphabetically, as in `oblique plot`.
+/// Returns the codes of the cells and adds their dictionary to `head`. The most frequent text comes
+/// first and equally frequent texts are in alphabetical order, as in `oblique plot`.
 std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
   std::vector<std::uint16_t> codes;
   for (const Mark mark : marks_) {
@@ -338,7 +338,7 @@ std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
   for (std::size_t code = 0; code < ranked.size(); ++code) {
     const auto& [text, places] = ranked[code];
     for (const std::size_t cell : places) {
-      // A code above the limit would be a mark. Only an edited database has so many texts.
+      // A larger code would have the meaning of a mark. Only an edited database has so many texts.
       codes[cell] = static_cast<std::uint16_t>(std::min<std::size_t>(code, kLastCode - 5));
     }
     head["dictionary"].push_back({{"text", text}, {"cells", places.size()}});
@@ -349,8 +349,8 @@ std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
 // ---- Bins ---------------------------------------------------------------------------------------
 
 constexpr std::uint64_t kUsualBins = 64;
-/// Values within this relative distance of an end count as inside, because users type 0.2 for 0.6 /
-/// 3.
+/// Values within this relative distance outside an end count as inside, because users may type 0.2
+/// for 0.6 / 3.
 constexpr double kEndTolerance = 1e-12;
 
 std::string sql_number(double value) {
@@ -369,7 +369,7 @@ struct BinSide {
   double most = 0.0;
 
   bool has_typed_ends() const { return typed_least && typed_most; }
-  /// The SQL condition for rows whose value may be in a bin of this axis.
+  /// Returns the SQL condition for rows whose value may be in a bin of this axis.
   std::string has_place_sql() const {
     return fmt::format("{} {}", column.name, is_logarithmic ? "> 0" : "IS NOT NULL");
   }
@@ -390,9 +390,9 @@ struct BinSide {
     return fmt::format("max(min(CAST(({} - {}) * {} AS INTEGER), {}), 0)", place, sql_number(first),
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
-  /// Sets ends that the user did not give to those of `range`, the range of the column, which is
-  /// empty if no row has a value. Equal ends make one bin. Throws std::invalid_argument for wrong
-  /// ends.
+  /// Sets the ends of the axis: those that the user gave, else those of `range`, the range of
+  /// values in the column, which is empty if no row has a value. Equal ends make one bin. Throws
+  /// std::invalid_argument for wrong ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));
     most = typed_most.value_or(range ? range->second : least);
@@ -466,8 +466,7 @@ StudyAnswer::Next BinsAnswer::next(const ServedStudy& study) {
   return counts_.empty() ? Next(counts_query()) : Next(answer(study.id));
 }
 
-/// A query of the solved points that meet the condition and have values on both axes of the
-/// picture.
+/// Queries the solved points that meet the condition and have values on all axes of the picture.
 protocol::StudyQuery BinsAnswer::query() const {
   std::string where =
       condition().empty() ? "error IS NULL" : fmt::format("({}) AND error IS NULL", condition());
@@ -487,7 +486,7 @@ protocol::StudyQuery BinsAnswer::ends_query() const {
   return query;
 }
 
-/// A query with one row per bin. Rows outside the ends have the bin NULL.
+/// Returns a query that gives one row per bin. Points outside the ends are counted in the bin NULL.
 protocol::StudyQuery BinsAnswer::counts_query() {
   std::size_t size = 1;
   std::string bin;

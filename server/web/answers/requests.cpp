@@ -124,7 +124,7 @@ class RowStream {
 
   std::shared_ptr<ServiceExchange> exchange_;
   bool as_csv_;
-  std::string text_;  // text that is not sent yet
+  std::string text_;  // text that was not sent yet
   std::uint64_t rows_ = 0;
   bool has_ended_ = false;
 };
@@ -180,7 +180,8 @@ HttpAnswer trace_answer(std::uint64_t point, bool with_shape, const protocol::Tr
 using NextStep = std::variant<HttpAnswer, ClientRequest>;
 using OnReply = std::function<NextStep(const ClientReply&)>;
 
-/// Sends requests one after another until there is an answer. An error of the service is an answer.
+/// Sends requests to the service one after another until there is an answer. An error of the
+/// service becomes the answer.
 PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const ClientRequest& first,
                            OnReply on_reply) {
   exchange->send(first);
@@ -197,8 +198,8 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
-/// The same for a study that HTTP identifies by number and the service by name; sets the name in
-/// `request`.
+/// Sends requests about a study, which HTTP identifies by number and the service by name, until
+/// there is an answer. `request` makes the request from the name.
 PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
                                std::function<ClientRequest(const std::string&)> request,
                                OnReply on_reply) {
@@ -320,7 +321,7 @@ PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint
     return FieldReader(fields).text(name).value_or("") == "1";
   };
   const bool with_shape = is_set("shape");
-  ClientRequest request;  // `every` is 0: as many instants as fit
+  ClientRequest request;  // without `every` the trace has as many instants as fit
   request.mutable_trace()->set_point(point);
   request.mutable_trace()->set_shape(with_shape);
   request.mutable_trace()->set_fall(is_set("fall"));

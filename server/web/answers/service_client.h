@@ -18,13 +18,12 @@
 
 namespace oblique::server {
 
-/// A limited number of slots, for example for concurrent requests. Must outlive the slots that it
-/// gives out.
+/// A limited number of slots, for example for concurrent requests. Must outlive all slots.
 class Slots {
  public:
   explicit Slots(std::size_t count) : free_(count) {}
-  /// Takes a slot, which is free again when the last copy of the pointer is gone. Null if none is
-  /// free.
+  /// Takes a slot. The slot is free again when the last copy of the returned pointer is destroyed.
+  /// Returns null if no slot is free.
   std::shared_ptr<const void> take() {
     if (free_ == 0) {
       return nullptr;
@@ -42,45 +41,44 @@ class RecipeCache {
  public:
   using Table = std::shared_ptr<const protocol::PointTable>;
 
-  /// Null if the recipe is not in the cache, or the study has grown since.
+  /// Returns null if the recipe is not in the cache or the study has grown since.
   Table find(std::uint64_t study, std::uint64_t points) const;
   void put(std::uint64_t study, Table table);
 
  private:
-  std::deque<std::pair<std::uint64_t, Table>> kept_;  // latest first
+  std::deque<std::pair<std::uint64_t, Table>> kept_;  // the latest first
 };
 
-/// The HTTP thread as one client of the service: passes requests to the loop's thread, and replies
-/// back.
+/// Lets the HTTP thread use the service like a client: passes requests and replies between threads.
 class ServiceClient {
  public:
-  /// The identity of this client in the service, which no connection has.
+  /// The identity of this client in the service. No connection has this identity.
   static constexpr const char* kIdentity = "the page";
 
   // ---- Called by the HTTP server's thread.
-  /// A new request number, different from those of browser requests.
+  // Returns a new request number. Requests of browsers never have such a number.
   std::uint64_t new_number() { return ++last_number_; }
   void ask(std::uint64_t number, protocol::ClientRequest request);
-  /// The next reply to request `number`, if there is one.
+  /// Returns the next reply to request `number`, if one has arrived.
   std::optional<protocol::ClientReply> reply(std::uint64_t number);
   /// Drops further replies to request `number` and ends its query or trace.
   void forget(std::uint64_t number);
   RecipeCache& recipes() { return recipes_; }
-  /// Slots for requests whose replies need much memory.
+  /// Return slots for requests whose replies need much memory.
   Slots& recipe_slots() { return recipe_slots_; }
   Slots& trace_slots() { return trace_slots_; }
 
   // ---- Called by the loop's thread.
-  /// Readable when there are requests to take.
+  // Becomes readable when there are requests to take.
   int descriptor() const { return woken_.descriptor(); }
-  /// Takes the next few encoded ClientRequests.
+  /// Takes some of the waiting requests, encoded as ClientRequest.
   std::vector<std::string> take();
-  /// Adds an encoded ClientReply.
+  /// Adds a reply, encoded as ClientReply.
   void put(std::string frame);
 
  private:
   struct Awaited {
-    bool may_end = false;  ///< a query or trace without its last reply
+    bool may_end = false;  ///< true for a query or trace whose last reply has not arrived
     std::deque<protocol::ClientReply> replies = {};
   };
 
@@ -91,7 +89,7 @@ class ServiceClient {
   std::mutex mutex_;
   std::deque<std::string> requests_;  // guarded by mutex_
   std::vector<std::string> frames_;   // guarded by mutex_
-  // Used by the HTTP server's thread only.
+  // The members below are used only by the HTTP server's thread.
   std::uint64_t last_number_ = std::uint64_t{1} << 63U;
   std::map<std::uint64_t, Awaited> awaited_;
   RecipeCache recipes_;
@@ -99,9 +97,9 @@ class ServiceClient {
   Slots trace_slots_{limits::kTracesOfPage};
 };
 
-/// Sends requests to the service one after another. Each except those for more rows has its own
-/// number, because a late error about the previous one may follow. The destructor ends the running
-/// request.
+/// Sends requests to the service one after another. Each request except one for more rows has its
+/// own number, because a late error about the previous request may follow. The destructor ends the
+/// running request.
 class ServiceExchange {
  public:
   explicit ServiceExchange(ServiceClient& service) : service_(service) {}
@@ -115,14 +113,14 @@ class ServiceExchange {
     chunks_ = 0;
     service_.ask(number_, request);
   }
-  /// Confirms one more chunk of the answer to the query.
+  /// Requests more rows by confirming one more chunk of the answer.
   void request_more_rows() {
     protocol::ClientRequest more;
     more.mutable_more_rows()->set_request_id(number_);
     more.mutable_more_rows()->set_received(++chunks_);
     service_.ask(number_, more);
   }
-  /// The next reply, if it has come.
+  /// Returns the next reply, if one has arrived.
   std::optional<protocol::ClientReply> reply() { return service_.reply(number_); }
 
  private:
@@ -131,7 +129,7 @@ class ServiceExchange {
   std::uint64_t chunks_ = 0;
 };
 
-/// The HTTP answer for an error of the service, without the name of an unknown study.
+/// Returns the HTTP answer for an error of the service, without the name of an unknown study.
 HttpAnswer failure(const protocol::ErrorReply& error);
 
 }  // namespace oblique::server

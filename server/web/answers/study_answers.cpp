@@ -31,7 +31,8 @@ using nlohmann::ordered_json;
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-/// Longer lists of values are omitted; slices contain the values that they show.
+/// Maximum length of a list of values. Longer lists are omitted; slices contain the values they
+/// show.
 constexpr std::uint64_t kMaxListed = 4096;
 
 ordered_json axis_json(const protocol::AxisLayout& layout) {
@@ -85,7 +86,7 @@ ordered_json columns_json() {
   return columns;
 }
 
-/// The model of blocks without model axes, as a list of keys.
+/// Returns the model of blocks without model axes, as a list of keys.
 ordered_json model_json(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message_unchecked(recipe.model());
   ordered_json keys = ordered_json::array();
@@ -147,7 +148,7 @@ class OnePoint : public StudyAnswer {
   const std::uint64_t point_;
 };
 
-/// Parses a model from JSON: preset and integrator are names, other keys numbers.
+/// Reads a model from JSON. Preset and integrator are names, all other keys are numbers.
 protocol::ModelParameters model_of(const nlohmann::json& written) {
   protocol::ModelInput model;
   for (const auto& [key, value] : written.items()) {
@@ -165,8 +166,8 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   return protocol::to_message(model.model());
 }
 
-/// The smallest drop [m] above which only a computed fall shows whether the tip reaches H, if the
-/// study has such an H.
+/// If the study has an H that the tip may not reach, returns the drop [m] up to which every tip is
+/// sure to reach H. Above it only a computed fall gives the answer.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
@@ -226,7 +227,7 @@ class Flow {
       slot_.reset();
       return go_on();
     }
-    if (error_) {  // the condition is not the fault
+    if (error_) {  // the unchanged condition runs, so it did not cause the error
       return error_;
     }
     if (!protocol::is_sound(reply.query())) {
@@ -300,12 +301,12 @@ class Flow {
   ServiceClient& service_;
   ServiceExchange exchange_;
   ServedStudy study_;
-  std::uint64_t points_ = 0;          // number of points of the study
-  std::shared_ptr<const void> slot_;  // held while the recipe is requested
+  std::uint64_t points_ = 0;          // number of points in the study
+  std::shared_ptr<const void> slot_;  // held while the recipe is being requested
   bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;
-  std::optional<HttpAnswer> error_;  // set while the unchanged condition runs alone
+  std::optional<HttpAnswer> error_;  // set while the user's condition runs alone
 };
 
 }  // namespace
@@ -342,7 +343,8 @@ HttpAnswer check_answer(const std::string& body) {
 }
 
 protocol::SubmitRequest study_of_body(const std::string& body) {
-  // Protobuf refuses deeper JSON too. Copying or writing it would overflow the stack.
+  // Maximum nesting of JSON, also Protobuf's. Copying or writing deeper JSON could overflow the
+  // stack.
   constexpr int kDeepest = 50;
   bool is_deep = false;
   auto whole = nlohmann::json::parse(

@@ -21,40 +21,40 @@ namespace oblique::server {
 struct HttpRequest {
   std::string method;
   std::string path;  ///< without the query string
-  /// decoded fields of the query string; the first of equal names
+  /// decoded fields of the query string; if names are equal, the first field
   std::map<std::string, std::string> fields;
   std::multimap<std::string, std::string> headers;  ///< header names in lower case
   std::string body;
-  bool has_zero_bytes = false;  ///< a field contains zero bytes
+  bool has_zero_bytes = false;  ///< true if a field contains a zero byte
 
-  /// All values of a header.
+  /// Returns all values of a header.
   std::vector<std::string> all(const std::string& name) const;
-  /// The first value of a header; empty if it is absent.
+  /// Returns the first value of a header; empty if it is absent.
   std::string header(const std::string& name) const;
 };
 
-/// Returns the next bytes of an answer; empty if there are none yet, nothing at the end. Called on
-/// the HTTP thread, again after each wake; destroyed when the connection ends. Throws to break off
-/// the answer.
+/// Returns the next bytes of an answer: empty if there are none yet, nothing at the end. Called on
+/// the HTTP thread and again after each wake; destroyed when the connection ends. An exception ends
+/// the connection.
 using HttpStream = std::function<std::optional<std::string>()>;
 
 struct HttpAnswer {
-  unsigned status;  ///< MHD_HTTP_OK and so on
+  unsigned status;  ///< MHD_HTTP_OK or another status
   std::string content_type;
   std::string body;
-  /// in addition to those of all answers
+  /// headers in addition to those that every answer has
   std::vector<std::pair<std::string, std::string>> headers = {};
-  HttpStream stream = {};                       ///< replaces the body, if set
+  HttpStream stream = {};                       ///< if set, replaces the body
   std::shared_ptr<const void> until_sent = {};  ///< destroyed when the body has been sent
 };
 
-/// Returns the answer when it is ready. Called on the HTTP thread, again after each wake; destroyed
-/// when it has returned the answer or the client has disconnected.
+/// Returns the answer when it is ready. Called on the HTTP thread and again after each wake;
+/// destroyed when it has returned the answer or the client has disconnected.
 using PendingAnswer = std::function<std::optional<HttpAnswer>()>;
 
 using HttpOutcome = std::variant<HttpAnswer, PendingAnswer>;
 
-/// Parses a text that is a single number; none for other texts.
+/// Parses a text that consists of a single number; nothing for other texts.
 template <typename Number>
 std::optional<Number> read_number(const std::string& text) {
   Number number{};
@@ -63,16 +63,17 @@ std::optional<Number> read_number(const std::string& text) {
   return error == std::errc() && rest == end ? std::optional(number) : std::nullopt;
 }
 
-/// An answer with a sentence as plain text.
+/// Returns an answer with a sentence as plain text.
 HttpAnswer text_answer(unsigned status, std::string_view sentence);
 
 HttpAnswer json_answer(const nlohmann::ordered_json& value, unsigned status = 200);
 
-/// An answer with the JSON {"error": sentence}.
+/// Returns an answer with the JSON {"error": sentence}.
 HttpAnswer error_answer(unsigned status, const std::string& sentence);
 
-/// An answer with binary numbers: four bytes with the length of the head, little endian; the head
-/// as JSON, padded with spaces so that the numbers begin at a multiple of eight bytes; the numbers.
+/// Returns an answer with binary numbers. It consists of the length of the head in four bytes,
+/// little endian; the head as JSON, padded with spaces so that the numbers begin at a multiple of
+/// eight bytes; and the numbers.
 HttpAnswer numbers_answer(const nlohmann::ordered_json& head, const std::string& numbers);
 
 /// Formats JSON on one line; replaces bytes that are not UTF-8.

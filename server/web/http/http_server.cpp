@@ -20,7 +20,7 @@
 namespace oblique::server {
 namespace {
 
-/// Content-Security-Policy: our pages load only files of this server, and no page may embed them.
+/// Content-Security-Policy: our pages load files only from this server, and no page may embed them.
 constexpr const char* kContentPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
@@ -46,8 +46,8 @@ MHD_Result take_field(void* into, MHD_ValueKind /*kind*/, const char* name, std:
   return MHD_YES;
 }
 
-/// Whether the client has closed the connection or its sending half, as browsers do when they no
-/// longer need the answer. libmicrohttpd does not watch a suspended connection.
+/// Returns whether the client has closed the connection or its sending half. Browsers do so when
+/// they no longer need the answer, and libmicrohttpd does not watch a suspended connection.
 bool is_gone(MHD_Connection* connection) {
   pollfd item{MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd,
               POLLRDHUP, 0};
@@ -101,7 +101,7 @@ struct HttpServer::Stream {
   MHD_Connection* const connection;
   HttpStream next;
   std::string unsent = {};
-  std::size_t sent = 0;  ///< number of bytes of `unsent` that were sent
+  std::size_t sent = 0;  ///< number of sent bytes at the beginning of `unsent`
 };
 
 HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
@@ -118,7 +118,7 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
   if (socket < 0) {
     throw std::runtime_error("cannot listen at " + url_ + ": " + std::strerror(errno));
   }
-  // Not epoll, with which libmicrohttpd 0.9.75 stops serving at the connection limit.
+  // Uses poll, because with epoll libmicrohttpd 0.9.75 stops serving at the connection limit.
   daemon_ = MHD_start_daemon(
       MHD_USE_INTERNAL_POLLING_THREAD | MHD_USE_POLL | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr,
       nullptr, &HttpServer::on_request, this, MHD_OPTION_LISTEN_SOCKET, socket,
@@ -135,7 +135,7 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
 
 HttpServer::~HttpServer() {
   is_stopping_ = true;
-  wake();  // libmicrohttpd can stop only without suspended connections
+  wake();  // libmicrohttpd cannot stop while a connection is suspended
   MHD_stop_daemon(daemon_);
 }
 
@@ -153,15 +153,15 @@ void HttpServer::wake() {
   }
 }
 
-/// libmicrohttpd restarts its idle time at each byte, so a slow peer could stay for ever;
-/// transfers_ limits the whole transfer.
+/// Starts or ends the time limit of a connection. libmicrohttpd restarts its own idle time at each
+/// byte, so a slow peer could stay for ever.
 void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*context*/,
                                MHD_ConnectionNotificationCode what) {
   auto& server = *static_cast<HttpServer*>(self);
   const Time due = server.due_for(0);
   const std::lock_guard lock(server.mutex_);
   if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
-    server.transfers_.erase(connection);  // its socket is still open
+    server.transfers_.erase(connection);  // at this moment its socket is still open
     return;
   }
   const int socket =
@@ -169,7 +169,7 @@ void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*
   try {
     server.transfers_.insert_or_assign(connection, Transfer{socket, due});
   } catch (const std::exception&) {
-    ::shutdown(socket, SHUT_RDWR);  // out of memory, so the connection ends
+    ::shutdown(socket, SHUT_RDWR);  // no memory is left, so the connection ends
   }
 }
 
@@ -183,8 +183,8 @@ void HttpServer::set_due(MHD_Connection* connection, Time due) {
   transfers_.at(connection).due = due;
 }
 
-/// `wakes` is the number of wakes before the answer was polled. After a later wake the connection
-/// is not suspended.
+/// Suspends a connection until the next wake. `wakes` is the number of wakes before the answer was
+/// polled; if another one has followed, does not suspend.
 void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
   const std::lock_guard lock(mutex_);
   MHD_suspend_connection(connection);
@@ -195,8 +195,8 @@ void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
   }
 }
 
-/// Called after the head of a request, for each part of its body, after the body, and when the
-/// connection is resumed.
+/// Called after the head of a request, after each part of its body, after the whole body, and when
+/// the connection is resumed.
 MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const char* path,
                                   const char* method, const char* /*version*/, const char* upload,
                                   std::size_t* upload_bytes, void** exchange) {
@@ -220,7 +220,7 @@ MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const 
     known.request.body.append(upload, bytes);
     return known.request.body.size() <= kMaxBodyBytes ? MHD_YES : MHD_NO;
   } catch (const std::exception&) {
-    return MHD_NO;  // out of memory, so the connection ends
+    return MHD_NO;  // no memory is left, so the connection ends
   }
 }
 
@@ -236,12 +236,13 @@ MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
     return send(connection, exchange, *std::move(refusal));
   }
   const std::string length = request.header("content-length");
-  set_due(connection, due_for(length.empty() ? 0 : std::stoul(length)));  // checked by `refuse`
+  // `refuse` has checked the header
+  set_due(connection, due_for(length.empty() ? 0 : std::stoul(length)));
   return MHD_YES;
 }
 
 MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
-  const std::uint64_t wakes = wakes_;  // read first, so that a wake during the poll is not lost
+  const std::uint64_t wakes = wakes_;  // read first, so that no wake is lost meanwhile
   if (is_stopping_ || (exchange.pending && is_gone(connection))) {
     return MHD_NO;
   }
@@ -288,7 +289,7 @@ MHD_Result HttpServer::send(MHD_Connection* connection, Exchange& exchange, Http
   return queued;
 }
 
-/// Moves the body or the stream out of the answer. Null if out of memory.
+/// Moves the body or the stream out of the answer. Returns null if no memory is left.
 MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& answer) {
   if (answer.stream) {
     constexpr std::size_t kBlock = 4096;
@@ -311,12 +312,12 @@ MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& an
   return response;
 }
 
-/// Called for more of a stream when all earlier bytes were sent, and after a wake.
+/// Called when all earlier bytes of a stream were sent, and after a wake.
 ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* into,
                               std::size_t most) {
   Stream& stream = *static_cast<Stream*>(context);
   HttpServer& server = stream.server;
-  const std::uint64_t wakes = server.wakes_;  // read first, as in `answer`
+  const std::uint64_t wakes = server.wakes_;  // read first, so that no wake is lost
   if (server.is_stopping_ || is_gone(stream.connection)) {
     return MHD_CONTENT_READER_END_WITH_ERROR;
   }

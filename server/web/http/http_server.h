@@ -18,49 +18,49 @@
 
 namespace oblique::server {
 
-/// Limits on resources that HTTP peers can use. A connection serves one request.
+/// Limits on resources that HTTP peers can use. Each connection serves one request.
 struct HttpLimits {
-  unsigned connections = 256;                ///< further ones wait to be accepted
-  unsigned connections_of_one_address = 64;  ///< further ones are closed
+  unsigned connections = 256;                ///< further connections wait to be accepted
+  unsigned connections_of_one_address = 64;  ///< further connections are closed
   unsigned streams = 32;
-  /// Memory of a connection for request line, headers and the headers of the answer.
+  /// Memory of a connection for the request line, its headers and the headers of the answer.
   std::size_t bytes_of_connection = std::size_t{16} * 1024;
   /// A connection is closed after this time without any transfer, except while the server prepares
-  /// its answer. The head of a request must arrive within this time of connecting.
+  /// its answer. The head of a request must arrive within this time after connecting.
   std::chrono::seconds idle{10};
-  /// Bodies and answers, except streams, may take `idle` plus a second for each of this number of
+  /// Requests and answers, except streams, may take `idle` plus one second per this number of
   /// bytes.
   std::size_t least_bytes_a_second = std::size_t{4} * 1024;
 };
 
-/// Functions that the server calls on its thread.
+/// Functions that the server calls. All except `now` are called on its thread.
 struct HttpHandlers {
   /// Answers a request. Throws std::invalid_argument for a wrong request.
   std::function<HttpOutcome(const HttpRequest&)> answer;
-  /// Returns why a POST is refused before its body is read; none: it is accepted.
+  /// Returns the answer that refuses a POST before its body is read; nothing if it is accepted.
   std::function<std::optional<HttpAnswer>(const HttpRequest&)> refuse_change;
   /// May be called on any thread.
   std::function<std::chrono::steady_clock::time_point()> now = std::chrono::steady_clock::now;
 };
 
-/// Answers GET, HEAD and POST over HTTP/1.0 and 1.1 on libmicrohttpd's thread. A request whose
-/// answer is not ready does not delay others.
+/// Answers GET, HEAD and POST over HTTP/1.0 and 1.1 on libmicrohttpd's thread. A request that waits
+/// for its answer does not delay others.
 class HttpServer {
  public:
-  /// Starts to listen. Throws std::runtime_error with the address on failure.
+  /// Starts to listen. Throws std::runtime_error, which names the address, if it cannot.
   HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
              HttpHandlers handlers);
-  /// Waiting requests get no answer.
+  /// Ends the server. Waiting requests get no answer.
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
 
-  /// Such as http://127.0.0.1:7602, with the actual port.
+  /// Returns an address with the actual port, such as http://127.0.0.1:7602.
   const std::string& url() const { return url_; }
-  /// Polls all pending answers and streams again, destroys those whose client has disconnected, and
-  /// ends connections whose time is over. Thread-safe; does not block.
+  /// Polls all pending answers and streams again, destroys those of disconnected clients, and ends
+  /// connections that exceed their time. Thread-safe; does not block.
   void wake();
-  /// Number of answers by status; for the handlers.
+  /// Returns the number of answers by status. Only handlers may call it.
   const std::map<unsigned, std::uint64_t>& answers() const { return answers_; }
 
  private:
@@ -85,7 +85,7 @@ class HttpServer {
   MHD_Result send(MHD_Connection* connection, Exchange& exchange, HttpAnswer answer);
   MHD_Response* response_of(MHD_Connection* connection, HttpAnswer& answer);
   void suspend(MHD_Connection* connection, std::uint64_t wakes);
-  /// Deadline for the transfer of that many bytes from now.
+  /// Returns the deadline for a transfer of this number of bytes that starts now.
   Time due_for(std::size_t bytes) const;
   void set_due(MHD_Connection* connection, Time due);
 
@@ -93,13 +93,13 @@ class HttpServer {
   const HttpLimits limits_;
   const HttpHandlers handlers_;
   std::string url_;
-  std::map<unsigned, std::uint64_t> answers_;  // used by the server's thread only
-  unsigned streams_ = 0;                       // the same
+  std::map<unsigned, std::uint64_t> answers_;  // used only by the server's thread
+  unsigned streams_ = 0;                       // used only by the server's thread
   std::atomic<bool> is_stopping_ = false;
   std::atomic<std::uint64_t> wakes_ = 0;
   std::mutex mutex_;
   std::set<MHD_Connection*> suspended_;            // guarded by mutex_
-  std::map<MHD_Connection*, Transfer> transfers_;  // of all connections; guarded by mutex_
+  std::map<MHD_Connection*, Transfer> transfers_;  // for all connections; guarded by mutex_
   MHD_Daemon* daemon_ = nullptr;
 };
 

@@ -7,36 +7,38 @@
 
 #include "server/web/http/http_message.h"
 
-// Address of the HTTP server, and rules for requests that it refuses whatever their content.
+// Address of the HTTP server, and rules that it applies to requests before their content.
 namespace oblique::server {
 
 struct HttpAddress {
-  std::string address = "127.0.0.1";  ///< numeric address
+  std::string address = "127.0.0.1";  ///< a numeric address
   std::string port = "7602";          ///< "*": chosen by the system
 };
 
-/// Parses ADDRESS:PORT, as 127.0.0.1:7602, [::1]:7602 or localhost:7602, or "off"; port 0 is chosen
-/// by the system. Throws std::runtime_error with what is allowed.
+/// Parses ADDRESS:PORT, such as 127.0.0.1:7602, [::1]:7602 or localhost:7602. With port 0 the
+/// system chooses the port. Returns nothing for "off". Throws std::runtime_error with what is
+/// allowed.
 std::optional<HttpAddress> parse_http_address(const std::string& text);
 
-/// The host of a Host header in lower case, without port and brackets; empty if malformed.
+/// Returns the host in a Host header in lower case, without port and brackets; empty if malformed.
 std::string host_without_port(const std::string& header);
 
-/// Names of this server that a Host header may have. A malicious page can make its own name resolve
-/// to our address (DNS rebinding) and then read our answers as its own site, but it cannot change
-/// the name that the browser sends.
+/// Names of this server that a Host header may contain. A malicious page can make its own name
+/// resolve to our address (DNS rebinding) and then read our answers as its own site, but it cannot
+/// change the name that the browser sends.
 struct OwnNames {
-  /// The server listens on loopback, so other addresses are not its names.
+  /// If true, the server listens on loopback, and addresses other than loopback are not its names.
   bool is_loopback = true;
-  /// Further names besides numeric addresses and localhost; in lower case.
+  /// Further allowed names, besides numeric addresses and localhost; in lower case.
   std::set<std::string> names;
 };
 
 inline constexpr std::uint64_t kMaxBodyBytes = std::uint64_t{256} * 1024;
 
-/// Why a request is refused; none if it is not. A POST must come from a page of this server,
-/// according to its `Origin`; programs use the clients' port. Requests from pages of other sites
-/// are refused, except a followed link to the page itself without any field.
+/// Returns the answer that refuses a request; nothing if the request is allowed. A POST must come
+/// from a page of this server, according to its `Origin`; programs use the clients' port instead.
+/// Requests from pages of other sites are refused, except a followed link to the page without any
+/// field.
 std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own);
 
 }  // namespace oblique::server

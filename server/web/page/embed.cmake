@@ -1,6 +1,6 @@
 # Writes a C++ source with the gzipped files of the page: cmake -DOUT=FILE -DFOLDER=DIR -DNAMES=a,b
-# -P embed.cmake. Blanks lines of our scripts that contain only comments, so that the others keep
-# their line numbers.
+# -P embed.cmake. In our scripts, lines that contain only comments become empty, so that line
+# numbers stay.
 string(REPLACE "," ";" NAMES "${NAMES}")
 set(entries "")
 set(arrays "")

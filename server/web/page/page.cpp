@@ -56,8 +56,8 @@ std::optional<PathChange> parse_change(const std::string& path) {
   return change ? std::optional(PathChange{parsed->study, *change}) : std::nullopt;
 }
 
-/// The file at the request's path (/ is the page), or 304 if the browser has it; none if there is
-/// no such file.
+/// Returns the file at the request's path (/ is the page), or 304 if the browser has the file
+/// already. Returns nothing if there is no such file.
 std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
   const auto files = page_files();
   const auto file = std::ranges::find_if(files, [&](const PageFile& one) {
@@ -66,7 +66,7 @@ std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
   if (file == files.end()) {
     return std::nullopt;
   }
-  // The browser caches the file and checks each time whether it has changed.
+  // The browser caches the file, but checks each time whether the file has changed.
   HttpAnswer answer{MHD_HTTP_OK,
                     std::string(file->content_type),
                     {},
@@ -103,8 +103,7 @@ std::optional<HttpAnswer> Page::refuse_change(const HttpRequest& request) const 
                              : std::optional(error_answer(MHD_HTTP_UNAUTHORIZED, kHowToEnter));
 }
 
-/// Exchanges the token for a cookie, which removes the token from the browser's address bar and
-/// history.
+/// Exchanges the token for a cookie, which keeps the token out of the browser's history.
 HttpAnswer Page::enter(const HttpRequest& request) const {
   if (!token().is(request.fields.at("token"))) {
     return text_answer(MHD_HTTP_FORBIDDEN,
@@ -228,7 +227,7 @@ void EventFeed::refresh() {
   std::string overview = overview_json(*latest);
   if (overview != overview_) {
     overview_ = std::move(overview);
-    // unique, because a restarted server uses the same clock
+    // a restarted server uses the same clock, so it never repeats an ID
     id_ = std::to_string(latest->made_ms);
   }
 }

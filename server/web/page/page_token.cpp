@@ -34,7 +34,7 @@ std::string drawn_token() {
   return protocol::sha256_of(bytes);
 }
 
-/// Compares in a time that does not depend on the number of equal characters.
+/// Compares two texts in a time that does not depend on the number of equal characters.
 bool is_same(std::string_view one, std::string_view other) {
   return one.size() == other.size() && sodium_memcmp(one.data(), other.data(), one.size()) == 0;
 }

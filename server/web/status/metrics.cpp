@@ -25,14 +25,13 @@ std::string text_of(double value) {
   return std::isnan(value) ? "NaN" : solver::exact_number(value);
 }
 
-/// Writes metrics in Prometheus' text format. Values of labels are fixed words and need no
-/// escaping.
+/// Writes metrics in Prometheus' text format. Labels have fixed words, which need no escaping.
 class MetricText {
  public:
   void gauge(std::string_view name, std::string_view help) { family(name, "gauge", help); }
   void counter(std::string_view name, std::string_view help) { family(name, "counter", help); }
 
-  /// Writes a value of the last metric; `labels` such as state="idle".
+  /// Writes a value of the metric that was begun last. An example of `labels` is state="idle".
   template <typename Value>
   void sample(Value value, std::string_view labels = {}) {
     text_ += labels.empty() ? fmt::format("{} {}\n", name_, text_of(value))

@@ -14,20 +14,20 @@
 namespace oblique::server {
 namespace {
 
-/// Shorter silences are shown as none, because heartbeats come every 900 ms.
+/// A shorter silence of a worker is not shown, because heartbeats come every 900 ms.
 constexpr std::uint32_t kSilence_ms = 2000;
 
-/// Time in which `threads_wanted` would solve the open points.
+/// The time in which `threads_wanted` threads would solve all open points.
 constexpr double kWantedWithin_s = 60.0;
 
 void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapshot) {
   const StudyStates& states = service.states();
   snapshot.studies_by_state = states.counts();
-  std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by descending priority, then by age
+  std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by falling priority, then by age
   ranked.reserve(states.unfinished().size());
   for (const StudyId id : states.unfinished()) {
     if (!service.scheduler().has_study(id)) {
-      continue;  // it is not durable yet
+      continue;  // the study is not durable yet
     }
     const StudyCounts points = service.scheduler().study(id);
     snapshot.points_open += states.record(id).state == StudyState::kRunning ? points.open() : 0;

@@ -23,32 +23,32 @@ namespace oblique::server {
 
 class Service;
 
-/// The state of the server at one moment, made by the event loop for the HTTP thread. Points are
-/// those of running and paused studies unless stated otherwise.
+/// The state of the server at one moment, made by the event loop for the HTTP thread. Numbers of
+/// points count running and paused studies unless stated otherwise.
 struct Snapshot {
-  std::int64_t made_ms = 0;         ///< on the steady clock
-  std::uint64_t points_solved = 0;  ///< stored since the server started
-  std::uint64_t points_failed = 0;  ///< as points_solved
-  std::uint64_t points_open = 0;    ///< in running studies
+  std::int64_t made_ms = 0;         ///< time on the steady clock
+  std::uint64_t points_solved = 0;  ///< number of points stored since the server started
+  std::uint64_t points_failed = 0;  ///< number of points stored since the server started
+  std::uint64_t points_open = 0;    ///< number of open points in running studies
   std::uint64_t points_leased = 0;
   double points_per_s = 0.0;
-  double thread_s_per_point = 0.0;  ///< over the last batches; 0: unknown
+  double thread_s_per_point = 0.0;  ///< average over the last batches; 0: unknown
   std::array<std::uint64_t, kStudyStates> studies_by_state{};
-  /// Running and paused studies: the first kShownStudies, by descending priority and then by age.
+  /// The first kShownStudies running and paused studies, by descending priority and then by age.
   std::vector<protocol::StudyStatus> studies;
-  std::uint64_t unlisted = 0;                   ///< number of further ones
-  std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers
-  WorkerGroups groups{};                        ///< all workers by state
+  std::uint64_t unlisted = 0;                   ///< running and paused studies that are not listed
+  std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers workers
+  WorkerGroups groups{};                        ///< number of workers in each state
 
   Histogram commit_s{{}};
-  std::uint64_t writer_bytes = 0;  ///< size of results that are not durable yet
-  std::string database_fault;      ///< why the database accepts no results; empty: it does
+  std::uint64_t writer_bytes = 0;  ///< size of results that are not durable yet [bytes]
+  std::string database_fault;      ///< why the database takes no results, or empty
   bool is_stopping = false;
-  std::array<std::uint64_t, kRefusalCauses> refusals{};  ///< peers by cause
+  std::array<std::uint64_t, kRefusalCauses> refusals{};  ///< number of refused peers by cause
   QueryCounts queries;
 
-  /// Number of threads that would solve the open points within a minute; 1 while points are open
-  /// and the time of a point is unknown.
+  /// Returns the number of threads that would solve the open points within a minute. If the time of
+  /// a point is unknown, returns 1 while points are open.
   std::uint64_t threads_wanted() const;
 };
 
@@ -61,13 +61,13 @@ struct SnapshotSources {
   const Writer& writer;
 };
 
-/// Takes time proportional to the running and paused studies and to the workers.
+/// Takes time proportional to the number of running and paused studies and of workers.
 Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms);
 
-/// Includes `left_s`, the remaining time [s]; null if unknown.
+/// The JSON includes `left_s`, the remaining time [s]; null if unknown.
 nlohmann::ordered_json study_json(const protocol::StudyStatus& study);
 nlohmann::ordered_json worker_json(const protocol::WorkerStatus& worker);
-/// A JSON array of the elements of a list.
+/// Returns a JSON array of the elements of a list.
 template <class List, class ToJson>
 nlohmann::ordered_json json_list(const List& list, const ToJson& to_json) {
   auto json = nlohmann::ordered_json::array();
@@ -77,10 +77,10 @@ nlohmann::ordered_json json_list(const List& list, const ToJson& to_json) {
   return json;
 }
 
-/// The overview for the page, as one line of JSON.
+/// Returns the overview for the page, as one line of JSON.
 std::string overview_json(const Snapshot& snapshot);
 
-/// What the file system reports about the database [bytes]; NaN if it reports nothing.
+/// Sizes that the file system reports for the database [bytes]; NaN if it reports none.
 struct DiskUsage {
   double database = 0.0;
   double wal = 0.0;  ///< 0 if there is no write-ahead log
@@ -91,11 +91,11 @@ DiskUsage disk_usage(const std::string& database);
 struct MetricSources {
   const Snapshot& snapshot;
   DiskUsage disk;
-  const std::map<unsigned, std::uint64_t>& http_answers;  ///< by status
+  const std::map<unsigned, std::uint64_t>& http_answers;  ///< number of answers by status
   std::string solver_version;
 };
 
-/// All metrics in Prometheus' text format 0.0.4; README.md lists them.
+/// Returns all metrics in Prometheus' text format 0.0.4. README.md lists them.
 std::string metrics_text(const MetricSources& sources);
 
 /// The latest snapshot, published by the event loop for the HTTP thread.
@@ -106,7 +106,7 @@ class SnapshotCache {
     const std::lock_guard lock(mutex_);
     latest_.swap(shared);
   }
-  /// The latest snapshot; null before the first one.
+  /// Returns the latest snapshot; null before the first one.
   std::shared_ptr<const Snapshot> latest() const {
     const std::lock_guard lock(mutex_);
     return latest_;

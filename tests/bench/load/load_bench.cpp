@@ -22,8 +22,9 @@
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 
-/// Many workers that solve nothing against one real server on loopback. Measures results per
-/// second, their cost in the server, and the latency of a client. README.md has the commands.
+/// Benchmarks many simulated workers, which solve nothing, against one real server on loopback.
+/// Measures results per second, their cost in the server, and the latency of a client. README.md
+/// has the commands.
 namespace oblique::bench {
 namespace {
 
@@ -66,7 +67,7 @@ void check(const test::Outcome& ran) {
   }
 }
 
-/// The folder of a row's server and, if keys are on, its keys.
+/// Folder for the server of one row; also holds its keys if the server uses keys.
 struct Place {
   explicit Place(bool with_keys) {
     if (with_keys) {
@@ -84,7 +85,7 @@ struct Place {
   test::Environment environment;
 };
 
-/// Submits a study too large to be completed.
+/// Submits a study that is too large to be completed.
 void submit(const Place& place, const test::Server& server) {
   std::vector<std::string> words{
       "submit",        "--server", server.client_url(), "--preset", "paper",        "--H",
@@ -96,8 +97,8 @@ void submit(const Place& place, const test::Server& server) {
   check(test::run_oblique(place.folder, words));
 }
 
-/// Measures and prints one row, with a new server and database. The measurement starts at the first
-/// stored result.
+/// Measures and prints one row of the table, with a new server and database. The measurement starts
+/// at the first stored result.
 void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_keys) {
   const Place place(with_keys);
   const test::Database database(place.folder.file("bench.db"));
@@ -136,7 +137,7 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_k
     rows = database.rows() - rows_before;
     seen = probe.stop();
   }
-  // By then the server has removed the lost workers.
+  // After this time the server has removed the lost workers.
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const Usage left = usage_of(pid);
   const double server_cpu_s = ended.cpu_s - began.cpu_s;

@@ -29,9 +29,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// Results in one message of a real worker.
+/// Number of results in one message of a real worker.
 constexpr std::uint64_t kResultsPerTurn = 1000;
-/// Real workers report at this interval while they solve a batch.
+/// Interval at which real workers report while they solve a batch.
 constexpr double kReportInterval_s = 0.1;
 
 double now_s() {
@@ -95,7 +95,7 @@ class LoadGenerator::Parts {
     worker::Conversation conversation;
     std::optional<zmq::socket_t> socket;
     std::deque<Job> jobs;
-    double solving_since_s = 0.0;  // start of the unreported points of the first job
+    double solving_since_s = 0.0;  // when the unreported points of the first job began
   };
 
   void run() {
@@ -135,8 +135,9 @@ class LoadGenerator::Parts {
     }
   }
 
-  /// Receives all messages and reports due points, until neither is left: sending may reset the
-  /// readiness of the descriptor (ZMQ_FD is edge-triggered).
+  /// Receives all messages and reports due points, until there are no more of either. One pass is
+  /// not enough, because sending may reset the readiness of the descriptor (ZMQ_FD is
+  /// edge-triggered).
   void work_on(std::size_t number) {
     receive_all(number);
     while (report_due(number) && receive_all(number)) {
@@ -167,7 +168,7 @@ class LoadGenerator::Parts {
     }
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
-    // At most one message, so that other workers get their turn.
+    // Sends at most one message, so that other workers get their turn.
     std::uint64_t solved = std::min<std::uint64_t>(left, kResultsPerTurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {
@@ -268,7 +269,7 @@ class LoadGenerator::Parts {
   std::atomic<std::uint64_t> welcomed_ = 0;
   std::atomic<double> longest_gap_s_ = 0.0;
   std::atomic<bool> stopping_ = false;
-  std::thread thread_;  // last: it uses the other members
+  std::thread thread_;  // declared last: it uses the other members
 };
 
 std::size_t bytes_of_result() {

@@ -13,7 +13,7 @@ namespace oblique::bench {
 struct LoadSettings {
   std::string worker_url;
   std::size_t workers = 1;
-  /// Simulated time per point; 0: workers answer at once.
+  /// Simulated time per point; with 0, workers answer at once.
   double point_s = 0.0;
   std::optional<protocol::KeyFile> key = {};  ///< shared by all workers
 };
@@ -25,19 +25,20 @@ struct LoadCounts {
   std::uint64_t messages = 0;  ///< sent
   std::uint64_t connects = 0;  ///< more than the number of workers if some had to reconnect
   std::uint64_t welcomed = 0;
-  /// Longest delay of the generator's thread. Above 2 s workers consider the server silent.
+  /// Longest delay of the generator's thread. If it exceeds 2 s, workers consider the server
+  /// silent.
   double longest_gap_s = 0.0;
 };
 
-/// Size of the result with which every point is answered.
+/// Size of the result that answers every point.
 std::size_t bytes_of_result();
 
-/// Many workers on one thread. Each has a real socket and a real conversation but solves nothing:
-/// it answers every point with the same result, solved beforehand.
+/// Many simulated workers on one thread. Each has its own socket and follows the worker protocol,
+/// but solves nothing: it answers every point with one result, which was solved beforehand.
 class LoadGenerator {
  public:
   explicit LoadGenerator(const LoadSettings& settings);
-  /// Closes all connections without goodbye.
+  /// Closes all connections without saying goodbye to the server.
   ~LoadGenerator();
   LoadGenerator(const LoadGenerator&) = delete;
   LoadGenerator& operator=(const LoadGenerator&) = delete;

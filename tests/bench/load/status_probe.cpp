@@ -57,7 +57,7 @@ void StatusProbe::run() {
   protocol::ClientRequest request;
   request.set_protocol_version(protocol::kProtocolVersion);
   request.mutable_status()->set_study(study_);
-  std::map<std::uint64_t, Clock::time_point> open_requests;  // time of each open request
+  std::map<std::uint64_t, Clock::time_point> open_requests;  // send time of each open request
   Clock::time_point next = Clock::now();
   while (!stopping_ || (!open_requests.empty() && Clock::now() < next + std::chrono::seconds(1))) {
     if (!stopping_ && Clock::now() >= next) {

@@ -83,7 +83,7 @@ TEST_F(FitCommand, ReportsWrongInput) {
   EXPECT_THAT(error_of({"--e", "1", "--fit", "kk=1:2", "--sd", "1%"}), HasSubstr("kk"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "links=2:4", "--sd", "1%"}), HasSubstr("links"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8"}),
-              HasSubstr("the standard deviation 0, which must be"));
+              HasSubstr("fn_peak_N has no standard deviation"));
   EXPECT_THAT(error_of({"--fit", "k=1e7:1e8", "--sd", "1%"}), HasSubstr("--e is missing"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "H=0.5:1", "--sd", "1%"}),
               HasSubstr("H is given twice"));

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <variant>
 #include <vector>
@@ -103,6 +104,20 @@ TEST_F(GrowingStudyTest, ContinuesACancelledStudy) {
   auto again = open();
   again.solve(drops({1.0}), "fn_peak_N", "round 1");
   EXPECT_EQ(again.solve(drops({0.5}), "fn_peak_N", "round 2").rows.size(), 1U);
+}
+
+TEST_F(GrowingStudyTest, ReportsMissingRowsOfAStudyThatWasRenamed) {
+  {
+    auto study = open();
+    study.solve(drops({1.0}), "fn_peak_N", "round 1");
+    study.solve(drops({0.5, 0.6}), "fn_peak_N", "round 2");
+  }
+  auto again = open();
+  again.solve(drops({1.0}), "fn_peak_N", "round 1");
+  Connection connection({.server_url = server_.client_url()});
+  connection.change("growing", protocol::STUDY_CHANGE_RENAME,
+                    connection.status("growing").at(0).study_id(), "renamed");
+  EXPECT_THROW(again.solve(drops({0.5, 0.6}), "fn_peak_N", "round 2"), std::runtime_error);
 }
 
 TEST_F(GrowingStudyTest, RefusesAnotherBlockOrModelUnderTheSameName) {

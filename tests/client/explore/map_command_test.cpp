@@ -71,6 +71,8 @@ TEST(MapCommand, JsonAndCsvHaveTheSameVerticesAndAPictureIsBesideTheTable) {
   }
   EXPECT_THAT(ran.out, HasSubstr("smaller than a cell, 0.244 in mu by 0.0938 in H, may be missed"));
   const auto map = nlohmann::json::parse(file_text(folder.file("map.json")));
+  // The table lists the six regions with at least 0.25 %.
+  EXPECT_THAT(ran.out, HasSubstr(std::to_string(map["regions"].size() - 6) + " other regions"));
   const auto csv = file_text(folder.file("map.csv"));
   EXPECT_TRUE(csv.starts_with("x,y,from,to,width,along\n")) << csv.substr(0, 100);
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')),
@@ -143,6 +145,8 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
       {{"--of", "major_modes=3"}, "unknown output `major_modes`"},
       {{"--of", "fn_peak_N"}, "COLUMN=LEVEL"},
       {{"--over", "mode"}, "--over: the values of mode are texts"},
+      {{"--over", "fn_peak_N,ft_peak_N"}, "a picture shows one output"},
+      {{"--elements-per-link", "200"}, "--elements-per-link 200 is too many"},
       {{"--out", "map.doc"}, "map.doc"},
       {{"--mu", "0.4"}, "mu is an axis of the map"},
       {{"--k", "1e7,2e7"}, "--k has several values"}};
@@ -155,7 +159,11 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
            {"mu", "is required as KEY=FROM:TO"},
            {"mu=2:1", "mu"},
            {"wind=0:1", "wind"},
-           {"mu=0:1:5", "is required as KEY=FROM:TO"}}) {
+           {"mu=0:1:5", "is required as KEY=FROM:TO"},
+           {"mu=0.5:0.5", "the ends must differ by more"},
+           {"mu=1:1.0000000001", "the ends must differ by more"},
+           {"links=1:3", "links must be a whole number"},
+           {"H=0.3:1", "--x and --y are both H"}}) {
     const auto ran = test::run_oblique(folder, {"map", "--x", x, "--y", "H=0.3:1", "--e", "1"});
     EXPECT_EQ(ran.exit_code, 2) << ran.out;
     EXPECT_THAT(ran.err, HasSubstr(message));

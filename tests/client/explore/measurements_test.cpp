@@ -54,13 +54,11 @@ TEST(Measurements, NameWhatIsWrongInAFile) {
   EXPECT_THAT(objection_to_file("H,fn_peak\n1,2\n", 0.01),
               HasSubstr("a column `fn_peak` (did you mean `fn_peak_N`?)"));
   EXPECT_THAT(objection_to_file("H,mode\n1,2\n", 0.01), HasSubstr("a column `mode`"));
-  EXPECT_THAT(
-      objection_to_file("H,fn_peak_N\n1,2\n"),
-      HasSubstr(
-          "measured.csv:2: fn_peak_N has the standard deviation 0, which must be positive: fill in "
-          "the column fn_peak_N_sd, or give --sd 1%"));
+  EXPECT_THAT(objection_to_file("H,fn_peak_N\n1,2\n"),
+              HasSubstr("measured.csv:2: fn_peak_N has no standard deviation: fill in the column "
+                        "fn_peak_N_sd, or give --sd 1%"));
   EXPECT_THAT(objection_to_file("H,fn_peak_N,fn_peak_N_sd\n1,2,-3\n"),
-              HasSubstr("deviation -3, which must be positive"));
+              HasSubstr("a standard deviation that is not positive"));
   EXPECT_THAT(objection_to_file("H,stick_total_s\n1,0\n", 0.01),
               HasSubstr("fill in the column stick_total_s_sd"));
   EXPECT_THAT(objection_to_file("H,fn_peak_N_sd\n1,2\n"), HasSubstr("a column `fn_peak_N_sd`"));

@@ -105,7 +105,7 @@ TEST(Sensitivity, MorrisScreensInputsAndDrawsThem) {
       folder, {"--method", "morris", "--rows", "8", "--out", folder.file("bars.gp"), "--quiet"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, StartsWith("output"));
-  EXPECT_THAT(outcome.out, HasSubstr("mu_star"));
+  EXPECT_THAT(outcome.out, HasSubstr("mu: their mean"));
   const auto script = text_in_file(folder.file("bars.gp"));
   EXPECT_THAT(script, HasSubstr("mu_star"));
   EXPECT_THAT(script, HasSubstr("duration_s"));
@@ -122,6 +122,7 @@ TEST(Sensitivity, WrongFlagsAreRefusedBeforeAnythingIsSolved) {
   EXPECT_THAT(objection({"--of", "fn_peek_N"}), HasSubstr("did you mean `fn_peak_N`?"));
   EXPECT_THAT(objection({"--method", "sobel"}), HasSubstr("sobol"));
   EXPECT_THAT(objection({"--interval", "0"}), HasSubstr("--interval"));
+  EXPECT_THAT(objection({"--rows", "1000000000000"}), HasSubstr("--rows"));
   EXPECT_THAT(objection({"--out", "bars.xyz"}), HasSubstr("--out"));
   EXPECT_THAT(objection({"--where", "mu > 1"}), HasSubstr("--where"));
   const auto constant =

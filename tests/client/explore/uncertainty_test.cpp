@@ -130,6 +130,9 @@ TEST(CorrelationTest, ItIsOneOnALineAndUndefinedForConstantValues) {
                    -1.0);
   EXPECT_LT(correlation_of(x, std::vector<double>{1.0, 16.0, 81.0, 256.0, 625.0}).value, 0.95);
   EXPECT_TRUE(std::isnan(correlation_of(x, std::vector<double>(5, 3.0)).value));
+  const std::vector<double> rising{1.0, 2.0, 3.0, 4.0, 5.0, 6.0};
+  EXPECT_TRUE(std::isnan(correlation_of(rising, std::vector<double>(6, 0.1)).value))
+      << "the sum of six times 0.1 is rounded";
   EXPECT_TRUE(std::isnan(correlation_of({}, {}).value));
 }
 

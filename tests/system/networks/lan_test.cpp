@@ -238,8 +238,7 @@ TEST_F(ChangedAddresses, ANameWithoutAddressIsReported) {
   server_name_ = "nowhere";
   const Outcome status = client({"status", "--timeout", "0.2"})->outcome();
   EXPECT_EQ(status.exit_code, 1);
-  EXPECT_NE(status.err.find("no address is known here for the name nowhere"), std::string::npos)
-      << status.err;
+  EXPECT_NE(status.err.find("the name nowhere has no address"), std::string::npos) << status.err;
 }
 
 using IPv6 = StudyOnLan;

@@ -9,9 +9,8 @@
 namespace oblique::solver {
 namespace {
 
-/// Iterations after which the step is too long.
 constexpr int kMaxIterations = 10;
-/// Corrections that no longer shrink are rounding when they are below this many errors allowed.
+/// Corrections that no longer shrink count as rounding below this many times the allowed error.
 constexpr double kRoundingErrors = 1000.0;
 
 }  // namespace
@@ -82,7 +81,7 @@ void CollocationLanes::attempt() {
   }
 }
 
-/// Iteration number `iteration` of Newton's method, from 1. True if a lane needs another one.
+/// One iteration of Newton's method, counted from 1. True if a lane needs another one.
 bool CollocationLanes::iterate(int iteration) {
   kernel_.iterate(gauss_collocation(), arrays_);
   bool is_any_active = false;
@@ -120,7 +119,7 @@ void CollocationLanes::accept() {
 CollocationLanes::Coordinate CollocationLanes::coordinate(std::size_t lane, std::size_t i) const {
   const std::size_t stride = vector_ * lanes();
   const std::size_t first = i * lanes() + lane;
-  Coordinate coordinate{arrays_.state[first], arrays_.state[first + stride], {}};
+  Coordinate coordinate{arrays_.h_s[lane], arrays_.state[first], arrays_.state[first + stride], {}};
   for (std::size_t stage = 0; stage < coordinate.a.size(); ++stage) {
     coordinate.a[stage] = arrays_.stage_a[first + stage * stride];
   }

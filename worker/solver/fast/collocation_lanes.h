@@ -9,24 +9,23 @@
 
 namespace oblique::solver {
 
-/// Chains of one shape that fall side by side, one a lane, each with constants and a step length of
-/// its own. A lane's bits do not depend on the others.
+/// Chains of one shape that fall side by side, one per lane, each with its own constants and step
+/// length. The bits of a lane do not depend on other lanes.
 class CollocationLanes {
  public:
-  /// Lanes for chains of the shape of `chain`. Each holds `chain` at rest.
+  /// For chains of the shape of `chain`. Each lane contains `chain` at rest.
   CollocationLanes(const LaneKernel& kernel, const Chain& chain);
 
   std::size_t lanes() const { return memory_.lanes(); }
 
-  /// A lane's next step, and the outcome of the last attempt.
+  /// The next step of a lane, and the outcome of its last attempt.
   struct Step {
-    double h_s = 0.0;      ///< 0 leaves the lane alone
-    double error_m = 0.0;  ///< allowed error of positions, mean square over the chain's mass
-    /// False if Newton's method did not converge. Then there is no new state.
-    bool converged = false;
+    double h_s = 0.0;        ///< 0: the lane does not move
+    double error_m = 0.0;    ///< allowed error of positions, mean square over the chain's mass
+    bool converged = false;  ///< whether Newton's method converged
     int iterations = 0;
-    /// Speed [m/s] that the step hardly resolves: h times the two highest Legendre coefficients of
-    /// the accelerations, mean square over the chain's mass.
+    /// Measure of unresolved motion [m/s]: h times the two highest Legendre coefficients of the
+    /// accelerations, mean square over the chain's mass.
     double unresolved_m_s = 0.0;
     bool is_accepted = true;
   };
@@ -35,17 +34,18 @@ class CollocationLanes {
 
   /// Puts a chain at rest into a lane.
   void load(std::size_t lane, const Chain& chain);
-  /// Positions, rates, and mean accelerations over the step that led there, a vector each.
+  /// Vectors of positions, rates, and mean accelerations over the last step.
   std::vector<double> state(std::size_t lane) const;
   void set_state(std::size_t lane, const std::vector<double>& q_v_mean);
   /// Tries the step of each lane.
   void attempt();
-  /// Accepts the states at the end of the last attempt in the lanes whose step is_accepted.
+  /// Accepts the last attempt in lanes whose step is_accepted; other lanes keep their states.
   void accept();
 
-  /// One coordinate of a lane at the start of the last attempt, and its accelerations at the
-  /// stages.
+  /// One coordinate of a lane: the step length of the last attempt, the values at its start and the
+  /// accelerations at its stages.
   struct Coordinate {
+    double h_s;
     double q;
     double v;
     std::array<double, GaussCollocation::kStages> a;

@@ -1,18 +1,18 @@
 #pragma once
 
 #include <cstddef>
+#include <type_traits>
 
 #include "worker/solver/fast/gauss_collocation.h"
 #include "worker/solver/reference/chain_kernel.h"
 
-/// (M + z K) x = b for complex z and a whole chain, for numbers or packs of lanes, by the frontal
-/// method: L D L^T without pivoting, element by element. A front has eight unknowns, both
-/// directions of p_i, s_i, p_j and s_j in the order of the rows of Chain. Those that no later
-/// element has are eliminated; the next front begins with the others. The half bandwidth is 7, and
-/// only entries of L that are not zero are computed.
+/// Solves (M + z K) x = b of a whole chain for complex z, for numbers or packs of lanes, by the
+/// frontal method: L D L^T without pivoting, element by element. A front contains the eight
+/// unknowns of an element, both directions of p_i, s_i, p_j and s_j in the order of the rows of
+/// Chain. Unknowns without a later element are eliminated; the others begin the next front.
 namespace oblique::solver {
 
-/// Plain: kernels share no functions, which those of std::complex are (README.md).
+/// Kernels must not call functions of std::complex, which other files use too (README.md).
 template <class Real>
 struct Complex {
   Real re;
@@ -32,8 +32,8 @@ constexpr std::size_t chain_factors(std::size_t links, std::size_t elements_per_
 
 namespace front_detail {
 
-/// Number of unknowns eliminated with an element: those of its left node; at a joint also the slope
-/// of the inner link; at the tip all.
+/// Number of unknowns eliminated with an element: those of its left node, at a joint also the slope
+/// of the inner link, at the tip all.
 template <class Constant>
 inline std::size_t pivots_of(const ChainTables<Constant>& chain, std::size_t element) {
   const bool ends_link = (element + 1) % chain.elements_per_link == 0;
@@ -41,16 +41,11 @@ inline std::size_t pivots_of(const ChainTables<Constant>& chain, std::size_t ele
   return ends_chain ? 8 : ends_link ? 6 : 4;
 }
 
-template <std::size_t number>
-struct Place {
-  static constexpr std::size_t value = number;
-};
-
-/// operation(Place<first>), ..., operation(Place<last - 1>): a loop that is always unrolled.
+/// Calls `operation` with integral constants from `first` to `last` - 1: an unrolled loop.
 template <std::size_t first, std::size_t last, class Operation>
 inline void for_each_place(const Operation& operation) {
   if constexpr (first < last) {
-    operation(Place<first>{});
+    operation(std::integral_constant<std::size_t, first>{});
     for_each_place<first + 1, last>(operation);
   }
 }
@@ -71,8 +66,7 @@ inline Complex<Real> inverse(const Complex<Real>& a) {
   return {a.re * scale, (0.0 - a.im) * scale};
 }
 
-/// Eliminates the unknowns first..last - 1 of a symmetric front, of which only the lower triangle
-/// is read.
+/// Eliminates the unknowns first..last - 1 of a symmetric front. Reads its lower triangle.
 template <std::size_t first, std::size_t last, class Real>
 inline void eliminate(Complex<Real> (&front)[8][8], Complex<Real>* factors) {
   for_each_place<first, last>([&](auto pivot) {
@@ -110,8 +104,7 @@ inline void substitute_backward(const Complex<Real>* factors, Complex<Real> (&x)
   for_each_place<0, pivots>([&](auto place) {
     constexpr std::size_t k = pivots - 1 - decltype(place)::value;
     Complex<Real> value = product(x[k], factors[front_factors(k)]);
-    // The row that was solved last enters the sum last, which shortens the chain of dependent
-    // operations.
+    // The row solved last enters the sum last, which shortens the chain of dependent operations.
     for_each_place<0, 7 - k>([&](auto later) {
       constexpr std::size_t i = 7 - decltype(later)::value;
       value = less(value, factors[front_factors(k) + i - k], x[i]);
@@ -152,13 +145,13 @@ inline void put_element(Complex<Real> (&front)[8][8], bool ends_at_joint,
 
 }  // namespace front_detail
 
-/// Factors M + z K into chain_factors() numbers. `tangent` has one entry an element. The pin's
-/// position is no unknown: its columns of `factors` are left alone and must be zero.
+/// Factors M + z K into chain_factors() numbers. `tangent` has one entry per element. Does not
+/// write the columns of the pin's position, which must be zero.
 template <class Real, class Constant>
 inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlocks<Real>* tangent,
                           const Complex<Real>& z, Complex<Real>* factors) {
   using namespace front_detail;
-  Complex<Real> carried[4][4]{};  // what the front before leaves to this one
+  Complex<Real> carried[4][4]{};  // remaining entries of the previous front
   const std::size_t elements = chain.links * chain.elements_per_link;
   for (std::size_t element = 0; element < elements; ++element) {
     const std::size_t pivots = pivots_of(chain, element);
@@ -194,9 +187,9 @@ inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlock
   }
 }
 
-/// Solves in place for `systems` factored matrices and right sides at once: system s has the s-th
-/// chain_factors() of `factors`, and its right side, real and imaginary parts, in the vectors 2 s
-/// and 2 s + 1 of `x`, each of 2 rows entries. The pin's rows must be zero.
+/// Solves `systems` factored systems in place. System s has the s-th chain_factors() numbers of
+/// `factors`, and the real and imaginary parts of its right side in the vectors 2 s and 2 s + 1 of
+/// `x`, each of 2 rows entries. The pin's rows must be zero.
 template <std::size_t systems, class Real, class Constant>
 inline void solve_fronts(const ChainTables<Constant>& chain, const Complex<Real>* factors,
                          Real* x) {

@@ -34,7 +34,6 @@ struct GaussCollocation {
   void integrals(double c, double* b) const;
 };
 
-/// The coefficients, computed once.
 const GaussCollocation& gauss_collocation();
 
 }  // namespace oblique::solver

@@ -1,16 +1,101 @@
 #pragma once
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
 #include <cstddef>
 #include <string_view>
 
 #include "worker/solver/fast/front_kernel.h"
 #include "worker/solver/fast/kernels.h"
-#include "worker/solver/fast/lane_pack.h"
 #include "worker/solver/reference/pefrl.h"
 
 namespace oblique::solver {
 
-/// Gathers the momenta of all links at both ends of a step.
+/// Vectors of the instruction sets that this source is compiled for, with multiply-adds c + a b and
+/// c - a b, which AVX2 and AVX-512 round once.
+struct BaselineVectors {
+  using Vector = double __attribute__((vector_size(16), may_alias));
+  static Vector plus_product(Vector c, Vector a, Vector b) { return c + a * b; }
+  static Vector less_product(Vector c, Vector a, Vector b) { return c - a * b; }
+};
+
+#if defined(__AVX2__) && defined(__FMA__)
+struct Avx2Vectors {
+  using Vector = double __attribute__((vector_size(32), may_alias));
+  static Vector plus_product(Vector c, Vector a, Vector b) { return _mm256_fmadd_pd(a, b, c); }
+  static Vector less_product(Vector c, Vector a, Vector b) { return _mm256_fnmadd_pd(a, b, c); }
+};
+#endif
+
+#if defined(__AVX512F__)
+struct Avx512Vectors {
+  using Vector = double __attribute__((vector_size(64), may_alias));
+  static Vector plus_product(Vector c, Vector a, Vector b) { return _mm512_fmadd_pd(a, b, c); }
+  static Vector less_product(Vector c, Vector a, Vector b) { return _mm512_fnmadd_pd(a, b, c); }
+};
+#endif
+
+/// A number for each lane, in `count` hardware vectors. With two, one computes while the other
+/// waits in the banded solve, whose rows depend on each other.
+template <class Hardware, std::size_t count>
+struct LanePack {
+  using Vector = typename Hardware::Vector;
+  static constexpr std::size_t kLanes = count * sizeof(Vector) / sizeof(double);
+
+  Vector part[count];
+
+  LanePack() = default;
+  /// `value` in all lanes.
+  inline LanePack(double value) : LanePack(each([&](std::size_t) { return value - Vector{}; })) {}
+
+  template <class Operation>
+  static inline LanePack each(const Operation& operation) {
+    LanePack result;
+    for (std::size_t i = 0; i < count; ++i) {
+      result.part[i] = operation(i);
+    }
+    return result;
+  }
+
+  friend inline LanePack operator+(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] + b.part[i]; });
+  }
+  friend inline LanePack operator-(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] - b.part[i]; });
+  }
+  friend inline LanePack operator*(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] * b.part[i]; });
+  }
+  friend inline LanePack operator/(const LanePack& a, const LanePack& b) {
+    return each([&](std::size_t i) { return a.part[i] / b.part[i]; });
+  }
+  inline LanePack& operator+=(const LanePack& b) { return *this = *this + b; }
+  inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
+};
+
+/// As in element_force.h; c and a are packs or numbers.
+template <class C, class A, class Hardware, std::size_t count>
+inline auto plus_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
+  using Pack = LanePack<Hardware, count>;
+  const Pack c_pack = c;
+  const Pack a_pack = a;
+  return Pack::each([&](std::size_t i) {
+    return Hardware::plus_product(c_pack.part[i], a_pack.part[i], b.part[i]);
+  });
+}
+
+template <class C, class A, class Hardware, std::size_t count>
+inline auto less_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
+  using Pack = LanePack<Hardware, count>;
+  const Pack c_pack = c;
+  const Pack a_pack = a;
+  return Pack::each([&](std::size_t i) {
+    return Hardware::less_product(c_pack.part[i], a_pack.part[i], b.part[i]);
+  });
+}
+
+/// Sums the momenta of all links at both ends of a step.
 template <class Constant, class Pack>
 struct MomentaOfStep {
   LinkMomenta<Constant, Pack> before;
@@ -20,8 +105,8 @@ struct MomentaOfStep {
   void end(std::size_t row, const PlanarVector<Pack>& v) { after.add(row, v); }
 };
 
-/// pefrl_step() of all lanes of `Pack`, a LanePack, with constants shared by all lanes or a pack of
-/// them.
+/// pefrl_step() of all lanes of the LanePack `Pack`. `Constant` is double if lanes share constants,
+/// else Pack.
 template <class Pack, class Constant>
 void step_packs(const ChainTables<Constant>& chain, const PefrlArrays& arrays) {
   const auto packs = [](double* numbers) { return reinterpret_cast<Pack*>(numbers); };
@@ -54,9 +139,9 @@ template <class Pack>
   step_packs<Pack>(chains.of<Pack>(), arrays);
 }
 
-/// One step of Gauss collocation for the lanes of `Pack`, a LanePack; compiled once for each
-/// instruction set. Unknowns are the accelerations of all stages, found by a simplified Newton
-/// method: one tangent a step, at the middle of what is predicted (collocation.md).
+/// One step of Gauss collocation for the lanes of the LanePack `Pack`. Unknowns are the
+/// accelerations of all stages. The simplified Newton method has one tangent per step, at the
+/// predicted middle (collocation.md).
 template <class Pack>
 class CollocationStep {
  public:
@@ -70,12 +155,9 @@ class CollocationStep {
         stage_q_(packs(arrays.stage_q)),
         stage_a_(packs(arrays.stage_a)) {}
 
-  /// Predicts with the mean acceleration of the step before, and factors M + h^2 lambda^2 K.
-  /// Writes the diagonal of M, too.
+  // As in LaneKernel. The prediction has the mean acceleration of the previous step.
   inline void prepare() const;
-  /// One iteration in the lanes that are active; writes the squared size of their corrections.
   inline void iterate() const;
-  /// Writes the state at the end of the step, and the squared size of what was hard to resolve.
   inline void finish() const;
 
  private:
@@ -83,7 +165,7 @@ class CollocationStep {
   static constexpr std::size_t kStages = GaussCollocation::kStages;
   static constexpr std::size_t kPairs = GaussCollocation::kPairs;
 
-  /// One entry of the vectors of all stages.
+  /// One entry of the vector of each stage.
   struct Stages {
     inline Stages(const Pack* first, std::size_t stride) {
       for (std::size_t stage = 0; stage < kStages; ++stage) {
@@ -170,7 +252,7 @@ template <class Pack>
   }
 }
 
-/// Q_gravity - dU/dq - M a of a stage.
+/// residual = Q_gravity - dU/dq - M a of a stage.
 template <class Pack>
 void CollocationStep<Pack>::put_residual(const Pack* q, const Pack* a, Pack* residual) const {
   for (std::size_t row = 0; row < chain_.rows; ++row) {

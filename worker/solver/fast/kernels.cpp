@@ -3,27 +3,13 @@
 namespace oblique::solver {
 namespace {
 
-std::vector<LaneKernel> find_kernels() {
-  std::vector<LaneKernel> kernels;
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0) {
-    kernels.push_back(avx512_kernel());
-  }
-  if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) {
-    kernels.push_back(avx2_kernel());
-  }
-#endif
-  kernels.push_back(baseline_kernel());
-  return kernels;
-}
-
 template <class Constants>
 std::span<const double> numbers(const Constants* first, std::size_t count) {
   static_assert(sizeof(Constants) % sizeof(double) == 0);
   return {reinterpret_cast<const double*>(first), count * sizeof(Constants) / sizeof(double)};
 }
 
-/// A chain's arrays of constants as plain numbers, in the order of ChainTables.
+/// The arrays of constants as plain numbers, in the order of ChainTables.
 std::array<std::span<const double>, 6> constants_of(const ChainTables<double>& chain) {
   return {
       numbers(chain.link, chain.links),    numbers(chain.mass_factor, chain.rows + kHalfBandwidth),
@@ -34,8 +20,20 @@ std::array<std::span<const double>, 6> constants_of(const ChainTables<double>& c
 }  // namespace
 
 std::span<const LaneKernel> runnable_lane_kernels() {
-  static const std::vector<LaneKernel> kernels = find_kernels();
-  return kernels;
+  static const std::vector<LaneKernel> runnable = [] {
+    std::vector<LaneKernel> kernels;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0) {
+      kernels.push_back(avx512_kernel());
+    }
+    if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) {
+      kernels.push_back(avx2_kernel());
+    }
+#endif
+    kernels.push_back(baseline_kernel());
+    return kernels;
+  }();
+  return runnable;
 }
 
 double* LaneMemory::zeros(std::size_t entries) {

@@ -12,7 +12,7 @@
 
 namespace oblique::solver {
 
-/// ChainTables of chains side by side, each constant one number a lane.
+/// ChainTables of several chains: each constant has one number per lane.
 struct LaneTables {
   std::size_t rows;
   std::size_t tip_row;
@@ -20,7 +20,7 @@ struct LaneTables {
   std::size_t elements_per_link;
   std::array<double*, 6> constants;  ///< in the order of ChainTables
 
-  /// As packs of as many lanes as there are chains.
+  /// `Pack` must have one lane per chain.
   template <class Pack>
   inline ChainTables<Pack> of() const {
     return {rows,
@@ -36,21 +36,21 @@ struct LaneTables {
   }
 };
 
-/// Owns arrays with one number a lane in each entry: entry i of a lane is element
-/// [i * lanes + lane]. Arrays are aligned for the widest vectors. Not copied: others point to them.
+/// Owns arrays with one number per lane in each entry: entry i of a lane is element
+/// [i * lanes + lane]. Arrays are aligned for the widest vectors and never move.
 class LaneMemory {
  public:
   explicit LaneMemory(std::size_t lanes) : lanes_(lanes) {}
 
   std::size_t lanes() const { return lanes_; }
-  /// An array of zeros, which lives as long as this.
+  /// Returns a new array of zeros, which lives as long as this object.
   double* zeros(std::size_t entries);
 
   /// Writes the first entries of one lane.
   void write(double* array, std::size_t lane, std::span<const double> values) const;
   /// Reads the first entries of one lane.
   void read(const double* array, std::size_t lane, std::span<double> values) const;
-  /// Tables of chains of the shape of `chain`, which is in every lane until another is written.
+  /// Returns new tables with `chain` in every lane.
   LaneTables tables(const ChainTables<double>& chain);
   void write(const LaneTables& tables, std::size_t lane, const ChainTables<double>& chain) const;
   /// Copies the first entries of one lane.
@@ -66,29 +66,29 @@ class LaneMemory {
 
 /// Arrays of a LaneMemory for one PEFRL step. A vector has 2 rows entries.
 struct PefrlArrays {
-  double* state;  ///< q and v: a vector each
-  double* next;   ///< the same at the end of the step
+  double* state;  ///< vectors q and v
+  double* next;   ///< vectors q and v at the end of the step
   double* scratch;
   double* h_s;
   double* force;      ///< fn0, ft0, k_nn, k_tn, k_tt, x0, y0
   double* integrals;  ///< impulse_n, impulse_t, work_t
   double* momenta;    ///< scratch for 4 entries a link
-  double* reactions;  ///< squared mean of each link's reaction
+  double* reactions;  ///< square of the mean reaction of each link
 };
 
 /// Arrays of a LaneMemory for one collocation step.
 struct CollocationArrays {
   LaneTables chain;
-  double* mass_kg;  ///< diagonal of the mass matrix, one a row
+  double* mass_kg;  ///< diagonal of the mass matrix, by row
   double* h_s;
-  double* active;   ///< 1 where corrections are wanted, else 0
-  double* state;    ///< q, v, and the mean acceleration over the step before: a vector each
-  double* next;     ///< the same at the end of the step
-  double* stage_q;  ///< a vector a stage, as the next two
+  double* active;   ///< 1 in lanes that iterate, else 0
+  double* state;    ///< vectors q, v, and the mean acceleration over the previous step
+  double* next;     ///< the same vectors at the end of the step
+  double* stage_q;  ///< one vector per stage, also in the next two arrays
   double* stage_a;
   double* work;
   double* tangents;  ///< TangentBlocks of each element
-  double* factors;   ///< chain_factors() for each pair
+  double* factors;   ///< chain_factors() complex numbers for each pair of eigenvalues
   double* squares;
 };
 
@@ -96,15 +96,15 @@ struct CollocationArrays {
 struct LaneKernel {
   std::string_view name;  ///< of the instruction set
   std::size_t lanes;
-  /// PEFRL, of lanes that share a chain's constants, and of lanes with chains of their own.
+  /// PEFRL for lanes that share the constants of a chain, and for lanes with different chains.
   void (*step_one_chain)(const ChainTables<double>& chain, const PefrlArrays& arrays);
   void (*step_chains)(const LaneTables& chains, const PefrlArrays& arrays);
-  /// Collocation: predicts, and factors the matrices of Newton's method.
+  /// Collocation: predicts the stages and factors the matrices of Newton's method.
   void (*prepare)(const GaussCollocation& rule, const CollocationArrays& arrays);
-  /// One iteration in the lanes that are active. Leaves in `squares` the sum over stages and rows
-  /// of mass times squared correction [kg m^2].
+  /// One iteration in active lanes. Sets `squares` to the sum over stages and rows of mass times
+  /// squared correction [kg m^2].
   void (*iterate)(const GaussCollocation& rule, const CollocationArrays& arrays);
-  /// Writes the state at the end. Leaves in `squares` h^2 times the sum over rows of mass times the
+  /// Writes the state at the end. Sets `squares` to h^2 times the sum over rows of mass times the
   /// squares of the two highest Legendre coefficients of the accelerations [kg m^2/s^2].
   void (*finish)(const GaussCollocation& rule, const CollocationArrays& arrays);
 };
@@ -112,13 +112,13 @@ struct LaneKernel {
 /// Kernels that this machine can run, the fastest first; never empty.
 std::span<const LaneKernel> runnable_lane_kernels();
 
-LaneKernel baseline_kernel();  ///< for every machine: SSE2 on x86-64, NEON on arm64
+LaneKernel baseline_kernel();  ///< for every machine: SSE2 on x86-64
 #if defined(__x86_64__)
 LaneKernel avx2_kernel();    ///< AVX2 and FMA
 LaneKernel avx512_kernel();  ///< AVX-512 F and DQ
 #endif
 
-/// Whether chains have the same numbers of links and elements, so that they fit side by side.
+/// Whether chains have the same numbers of links and elements and thus can share lanes.
 bool have_one_shape(const ChainTables<double>& a, const ChainTables<double>& b);
 
 }  // namespace oblique::solver

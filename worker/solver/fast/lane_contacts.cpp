@@ -18,13 +18,13 @@ using Clock = std::chrono::steady_clock;
 using Source = std::function<std::optional<ContactCase>()>;
 using Sink = std::function<void(Outcome&&)>;
 
-/// Maximum size of a group: the first case and its branches.
+/// Maximum number of cases that share the contact up to the first turn.
 constexpr std::size_t kLargestGroup = 16;
-/// In a span shorter than this fraction of a step, as next to an event, rounding dominates the mean
-/// of a reaction, so it is not used.
+/// The mean of a reaction over a shorter fraction of a step, as near an event, consists of rounding
+/// and is not used.
 constexpr double kShortestSpan = 1e-3;
 
-/// An unfinished contact, with the other data for its result.
+/// A contact under way, with the other data for its result.
 struct Progress {
   Contact contact;
   TipState touch;
@@ -33,14 +33,14 @@ struct Progress {
 };
 
 struct Lane {
-  std::optional<Progress> progress;  ///< empty: the lane is idle
+  std::optional<Progress> progress;  ///< empty if the lane is idle
   ContactCase contact_case{};
   std::optional<ExplicitMotion> motion;
-  std::vector<ContactCase> followers;  ///< the rest of the group, before the first turn
+  std::vector<ContactCase> followers;  ///< other cases of the group, until the first turn
   Clock::time_point started{};
 };
 
-/// A case that goes on from the first turn of its group.
+/// A case that starts at the first turn of its group.
 struct Branch {
   ContactCase contact_case;
   Progress progress;
@@ -114,7 +114,7 @@ class ContactLanes {
     }
   }
 
-  /// Takes the next case from the source into upcoming_. False if there is none.
+  /// Sets upcoming_ to the next case; false at the end.
   bool peek() {
     if (!upcoming_ && !is_exhausted_) {
       upcoming_ = source_();
@@ -136,7 +136,7 @@ class ContactLanes {
     slot.progress = std::move(progress);
   }
 
-  /// Whether the trial step of a lane is accepted. Sets its next step.
+  /// Returns whether the trial step of a lane is accepted. Sets the next step.
   bool judge(std::size_t lane) {
     Lane& slot = lanes_[lane];
     Contact& contact = slot.progress->contact;
@@ -148,7 +148,7 @@ class ContactLanes {
     } catch (const SolveError& error) {
       end(lane, std::nullopt, error.what());
       for (const ContactCase& follower : std::exchange(slot.followers, {})) {
-        sink_({follower.number, std::nullopt, error.what()});  // it would fail alike
+        sink_({follower.number, std::nullopt, error.what()});  // fails in the same way
       }
       return false;
     }
@@ -163,7 +163,6 @@ class ContactLanes {
     return is_accepted;
   }
 
-  /// After a step that was accepted or refused.
   void follow(std::size_t lane) {
     Lane& slot = lanes_[lane];
     const Contact& contact = slot.progress->contact;
@@ -213,7 +212,6 @@ class ContactLanes {
     sink_({lanes_[lane].contact_case.number, std::move(result), std::move(error)});
   }
 
-  /// Of a contact that has just ended.
   std::vector<ReactionPeak> reaction_peaks(std::size_t lane) {
     Progress& progress = *lanes_[lane].progress;
     if (progress.reactions.rises_at_end()) {
@@ -235,10 +233,10 @@ class ContactLanes {
   const Tracing& tracing_;
   LaneStepper stepper_;
   std::vector<Lane> lanes_;
-  std::size_t busy_ = 0;                 ///< lanes that are not idle
-  std::deque<Branch> branches_;          ///< taken before further cases
-  std::optional<ContactCase> upcoming_;  ///< given by the source, not taken yet
-  bool is_exhausted_ = false;            ///< the source gives nothing more
+  std::size_t busy_ = 0;                 ///< number of lanes that are not idle
+  std::deque<Branch> branches_;          ///< start before further cases
+  std::optional<ContactCase> upcoming_;  ///< next case of the source
+  bool is_exhausted_ = false;            ///< the source has no further cases
   std::vector<unsigned char> accept_;
   ChainState column_;
 };

@@ -11,21 +11,20 @@
 
 namespace oblique::solver {
 
-/// A contact to solve, from touch on.
+/// A contact to solve.
 struct ContactCase {
-  std::uint64_t number;  ///< the caller's, in the outcome
-  std::uint64_t group;   ///< cases of one group that follow each other differ in e* only
-  const Chain* chain;    ///< must live until the outcome is given
+  std::uint64_t number;  ///< of the outcome
+  std::uint64_t group;   ///< consecutive cases of one group differ only in e*
+  const Chain* chain;    ///< must live until the outcome is passed on
   ContactParameters parameters;
   ContactSteps steps;
-  const ChainState* touch;  ///< of the eliminated chain; read when the case is taken
+  const ChainState* touch;  ///< must live until the next case is taken from the source
 };
 
-/// Solves the contacts that `source` gives, until it gives nothing more, by the explicit integrator
-/// side by side in vector lanes (README.md). Chains must have the shape of `shape` (links, elements
-/// a link), which need not outlive the call. Outcomes, without H, fall time and solver name, come
-/// in the order in which contacts end; each has the same bits whatever its lane, neighbours and
-/// group. With `tracing`, every case is traced.
+/// Solves the contacts of `source` by the explicit integrator, side by side in vector lanes
+/// (README.md). All chains must have the shape of `shape`. Outcomes lack H, fall time and solver
+/// name, and come in the order in which contacts end. Each has the same bits in any lane, with any
+/// neighbours and group. Traces all cases if `tracing` has a sink.
 void solve_contacts(const Chain& shape, const std::function<std::optional<ContactCase>()>& source,
                     const std::function<void(Outcome&&)>& sink, const Tracing& tracing = {},
                     const LaneKernel& kernel = runnable_lane_kernels().front());

@@ -4,13 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
-#include <memory>
-#include <new>
 #include <numeric>
 #include <optional>
-#include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "worker/solver/fast/collocation_lanes.h"
 #include "worker/solver/fast/lane_stepper.h"
@@ -21,39 +17,32 @@ namespace oblique::solver {
 namespace {
 
 constexpr std::size_t kStages = GaussCollocation::kStages;
-/// Numbers in the states that a fall keeps at most: 16 MB. With fewer a state at a drop costs more
-/// than it should beside a contact; more leave room for fewer falls.
+/// Maximum size of the states that a fall keeps: 16 MB. With fewer states, finding the state at a
+/// drop takes long compared to a contact; with more, memory holds fewer falls.
 constexpr std::size_t kMaxOfStates = (std::size_t{16} << 20) / sizeof(double);
-/// A step is as long as leaves this times the accuracy asked for unresolved, in parts of sqrt(g
-/// length): collocation.md.
+/// Unresolved speed of a step, relative to accuracy times sqrt(g length) (collocation.md).
 constexpr double kUnresolved = 1.5;
-/// First step, in parts of sqrt(length/g).
+/// First step, relative to sqrt(length/g).
 constexpr double kFirstStep = 1.0 / 4000.0;
 /// Longest step, relative to sqrt(length/g): the chain turns by about 0.1 rad in it.
 constexpr double kLongestStep = 1.0 / 100.0;
-/// Allowed error of positions by Newton's method, relative to the length and to the requested
-/// accuracy.
+/// Allowed error of Newton's method in positions, relative to the length, per requested accuracy.
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
-/// Steps in a fall beyond which it is given up.
 constexpr std::size_t kMaxSteps = 2'000'000;
-/// Halvings in a row after which a fall is given up.
-constexpr int kMaxHalvings = 30;
+constexpr int kMaxHalvings = 30;  ///< of a step, in a row
 
-/// Solves falls side by side: a lane whose fall is over takes the next request. `Lanes` is
-/// SteppedLanes or CollocationFalls. What start() and judge() throw becomes the error of that fall,
-/// except for std::bad_alloc.
+/// Solves falls side by side; a lane whose fall is complete takes the next request. `Lanes` is
+/// SteppedLanes or CollocationFalls. An exception of start() or judge() becomes the fall's error.
 template <class Lanes>
 std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> requests, Lanes& lanes) {
   std::vector<FallSolution> solutions(requests.size());
   std::vector<std::optional<std::size_t>> falling(lanes.lanes());  // numbers of requests
-  // Calls `work`, and frees the lane when its fall is complete or has failed.
+  // Calls `work`; frees the lane if its fall is then complete or has failed.
   const auto attempt = [&](std::size_t lane, const auto& work) {
     FallSolution& solution = solutions[*falling[lane]];
     try {
       work(solution);
-    } catch (const std::bad_alloc&) {  // no fault of this fall
-      throw;
     } catch (const std::exception& error) {
       solution.error = error.what();
     }
@@ -84,7 +73,7 @@ std::vector<FallSolution> solve_side_by_side(std::span<const FallRequest> reques
   }
 }
 
-/// Falls by explicit steps, one a lane. All lanes are idle at first.
+/// Falls by explicit steps, one per lane. All lanes are idle at first.
 class SteppedLanes {
  public:
   SteppedLanes(const Chain& shape, const LaneKernel& kernel)
@@ -104,7 +93,7 @@ class SteppedLanes {
     stepper_.set_force(lane, {});
   }
   void step() { stepper_.step(); }
-  /// After each step: the lane's fall when it is complete, else nullptr.
+  /// To be called after each step. Returns the lane's fall if it is complete, else nullptr.
   std::shared_ptr<const Fall> judge(std::size_t lane) {
     if (!falls_[lane]->is_over_after_next(stepper_.trial_tip(lane))) {
       return nullptr;
@@ -134,12 +123,12 @@ class SteppedLanes {
 
   LaneStepper stepper_;
   std::vector<std::shared_ptr<SteppedFall>> falls_;
-  std::vector<unsigned char> all_;  ///< every lane takes each step
+  std::vector<unsigned char> all_;  ///< for settle(): accepts each step in every lane
   ChainState column_;
 };
 
-/// Weights of the stages' accelerations a in the position q + (c h v + h^2 sum by_q a) and the rate
-/// v + h sum by_v a at the fraction c of a step.
+/// Weights of the accelerations a at the stages: at the fraction c of a step the position is
+/// q + c h v + h^2 sum by_q a and the rate is v + h sum by_v a.
 struct DenseWeights {
   explicit DenseWeights(double fraction) : c(fraction) {
     const GaussCollocation& rule = gauss_collocation();
@@ -156,63 +145,58 @@ struct DenseWeights {
   double by_q[kStages];
 };
 
-/// One coordinate over a step: the polynomial through the stages.
-struct CoordinateOverStep {
-  double h_s;
-  CollocationLanes::Coordinate at;
+using Coordinate = CollocationLanes::Coordinate;
 
-  double position(const DenseWeights& weights) const {
-    return at.q + (weights.c * h_s * at.v + h_s * h_s * weighted(weights.by_q));
-  }
-  double rate(const double* by_v) const { return at.v + h_s * weighted(by_v); }
+double position(const Coordinate& at, const DenseWeights& weights) {
+  const double sum = std::inner_product(at.a.begin(), at.a.end(), weights.by_q, 0.0);
+  return at.q + (weights.c * at.h_s * at.v + at.h_s * at.h_s * sum);
+}
 
- private:
-  double weighted(const double* weights) const {
-    return std::inner_product(at.a.begin(), at.a.end(), weights, 0.0);
-  }
-};
+double rate(const Coordinate& at, const double* by_v) {
+  return at.v + at.h_s * std::inner_product(at.a.begin(), at.a.end(), by_v, 0.0);
+}
 
-/// Fraction of the step at which the height y first stops falling; above 1 if it falls during the
-/// whole step. Evaluated at the stages and at the end.
-double turn_of(const CoordinateOverStep& y) {
+/// Fraction of the step at which the height y first stops falling; above 1 if it falls at all
+/// stages and at the end.
+double turn_of(const Coordinate& y) {
   const GaussCollocation& rule = gauss_collocation();
   double low = 0.0;
   for (std::size_t place = 0; place <= kStages; ++place) {
     const bool is_stage = place < kStages;
     double high = is_stage ? rule.node[place] : 1.0;
-    if (y.rate(is_stage ? rule.integral[place] : rule.weight) < 0.0) {
+    if (rate(y, is_stage ? rule.integral[place] : rule.weight) < 0.0) {
       low = high;
       continue;
     }
     for (int i = 0; i < 60; ++i) {
       const double middle = 0.5 * (low + high);
-      (y.rate(DenseWeights(middle).by_v) < 0.0 ? low : high) = middle;
+      (rate(y, DenseWeights(middle).by_v) < 0.0 ? low : high) = middle;
     }
     return low;
   }
   return 2.0;
 }
 
-/// A fall solved by Gauss collocation. It keeps every step's length and some of the states, from
-/// which it solves steps again, with the same bits.
+/// A fall solved by Gauss collocation. It keeps the lengths of all steps and some states, from
+/// which it solves steps again with the same bits.
 class CollocationFall : public Fall {
  public:
-  /// `chain` must outlive this. `error_m` is the allowed error, as in the lanes' steps.
+  /// `chain` must outlive this. `error_m` as in CollocationLanes::Step.
   CollocationFall(const LaneKernel& kernel, const Chain& chain, double error_m)
       : kernel_(kernel), chain_(chain), error_m_(error_m) {}
 
-  /// Adds the step that a lane has solved and not accepted yet. True when the tip turns within it:
-  /// the fall is then complete.
-  bool append(const CollocationLanes& lanes, std::size_t lane, const CoordinateOverStep& tip_y) {
+  /// Adds a step that a lane has solved but not accepted. True if the tip turns within the step,
+  /// and so the fall is complete.
+  bool append(const CollocationLanes& lanes, std::size_t lane, const Coordinate& tip_y) {
     if (steps_.size() % steps_kept_ == 0) {
       states_.push_back(lanes.state(lane));
       thin_states();
     }
-    steps_.push_back({time_s_, -tip_y.at.q, tip_y.h_s});
+    steps_.push_back({time_s_, -tip_y.q, tip_y.h_s});
     const double turn = turn_of(tip_y);
     if (turn <= 1.0) {
       last_turn_ = turn;
-      largest_drop_m_ = -tip_y.position(DenseWeights(turn));
+      largest_drop_m_ = -position(tip_y, DenseWeights(turn));
       return true;
     }
     time_s_ += tip_y.h_s;
@@ -231,29 +215,29 @@ class CollocationFall : public Fall {
     return steps_.size() * sizeof(Step) + sizeof(double) * states_.size() * states_.front().size();
   }
 
-  /// Of the steps so far.
+  /// Duration of the steps so far.
   double time_s() const { return time_s_; }
   std::size_t steps() const { return steps_.size(); }
-  /// Number of the coordinate that is the tip's height.
+  /// Index of the coordinate that is the tip's height.
   std::size_t tip_y() const { return 2 * static_cast<std::size_t>(chain_.tip_row()) + 1; }
 
  private:
   struct Step {
-    double t_s;     ///< at its begin
-    double drop_m;  ///< at its begin
+    double t_s;     ///< at the start
+    double drop_m;  ///< at the start
     double h_s;
   };
 
   ChainState state_at_drop(double H_m) const override {
     const std::size_t number = step_from(H_m, &Step::drop_m);
-    const std::vector<CoordinateOverStep> step = solve_again(number);
+    const std::vector<Coordinate> step = solve_again(number);
     const double last = number + 1 == steps_.size() ? last_turn_ : 1.0;
-    const CoordinateOverStep& y = step[tip_y()];
+    const Coordinate& y = step[tip_y()];
     double at = 0.0;
     locate_drop(last, 1e-15, [&](double c) {
       at = c;
       const DenseWeights weights(c);
-      return std::pair(H_m + y.position(weights), y.h_s * y.rate(weights.by_v));
+      return std::pair(H_m + position(y, weights), y.h_s * rate(y, weights.by_v));
     });
     return within(number, step, at);
   }
@@ -264,7 +248,7 @@ class CollocationFall : public Fall {
     return static_cast<std::size_t>(after - steps_.begin() - 1);
   }
 
-  /// Keeps every second state once they are too many.
+  /// Drops every second state if they need too much memory.
   void thin_states() {
     if (states_.size() * states_.front().size() <= kMaxOfStates) {
       return;
@@ -276,7 +260,7 @@ class CollocationFall : public Fall {
     steps_kept_ *= 2;
   }
 
-  std::vector<CoordinateOverStep> solve_again(std::size_t number) const {
+  std::vector<Coordinate> solve_again(std::size_t number) const {
     CollocationLanes lanes(kernel_, chain_);
     lanes.set_state(0, states_[number / steps_kept_]);
     lanes.step(0).error_m = error_m_;
@@ -288,24 +272,23 @@ class CollocationFall : public Fall {
       }
       lanes.accept();
     }
-    std::vector<CoordinateOverStep> coordinates;
+    std::vector<Coordinate> coordinates;
     for (std::size_t i = 0; i < lanes.coordinates(); ++i) {
-      coordinates.push_back({steps_[number].h_s, lanes.coordinate(0, i)});
+      coordinates.push_back(lanes.coordinate(0, i));
     }
     return coordinates;
   }
 
-  /// The state at the fraction c of a step.
-  ChainState within(std::size_t number, const std::vector<CoordinateOverStep>& step,
-                    double c) const {
+  /// The state at the fraction c of step `number`.
+  ChainState within(std::size_t number, const std::vector<Coordinate>& step, double c) const {
     const DenseWeights weights(c);
     ChainState state;
     state.t_s = steps_[number].t_s + c * steps_[number].h_s;
     state.q.resize(2, chain_.rows());
     state.v.resize(2, chain_.rows());
     for (std::size_t i = 0; i < step.size(); ++i) {
-      state.q.data()[i] = step[i].position(weights);
-      state.v.data()[i] = step[i].rate(weights.by_v);
+      state.q.data()[i] = position(step[i], weights);
+      state.v.data()[i] = rate(step[i], weights.by_v);
     }
     return state;
   }
@@ -315,14 +298,14 @@ class CollocationFall : public Fall {
   double error_m_;
   double time_s_ = 0.0;
   double largest_drop_m_ = 0.0;
-  double last_turn_ = 1.0;  ///< where the tip turns, as a fraction of the last step
+  double last_turn_ = 1.0;  ///< fraction of the last step at which the tip turns
   std::vector<Step> steps_;
-  std::size_t steps_kept_ = 2;               ///< steps from one kept state to the next
+  std::size_t steps_kept_ = 2;               ///< number of steps between kept states
   std::vector<std::vector<double>> states_;  ///< position, rates, mean acceleration
 };
 
-/// Chooses the step length. It changes seldom and little, because the method is symplectic only
-/// with constant steps.
+/// Chooses the step length. Changes are rare and small, because the method is symplectic only with
+/// constant steps.
 class StepControl {
  public:
   StepControl(double length_m, double gravity_m_s2, double accuracy)
@@ -347,7 +330,7 @@ class StepControl {
     if (attempt.iterations >= kManyIterations) {
       change(0.8);
     } else if (steps_ >= kPatience && (mean > 1.0 + kBand || mean < 1.0 - kBand)) {
-      // The unresolved part falls as h^1.4 where it consists of vibrations of a released chain.
+      // For the vibrations of a released chain the unresolved speed is proportional to h^1.4.
       change(std::clamp(std::pow(std::max(mean, 1e-6), -0.7), 0.5, 1.5));
     }
     return true;
@@ -378,7 +361,7 @@ class StepControl {
   int halvings_ = 0;
 };
 
-/// Falls by collocation, one a lane.
+/// Falls by collocation, one per lane.
 class CollocationFalls {
  public:
   CollocationFalls(const Chain& shape, const LaneKernel& kernel)
@@ -417,8 +400,8 @@ class CollocationFalls {
       }
       return nullptr;
     }
-    const CoordinateOverStep tip_y{step.h_s, lanes_.coordinate(lane, fall->tip_y())};
-    if (!(std::abs(tip_y.at.q) <= 2.0 * length_m)) {
+    const Coordinate tip_y = lanes_.coordinate(lane, fall->tip_y());
+    if (!(std::abs(tip_y.q) <= 2.0 * length_m)) {
       throw SolveError("the fall diverged at t = " + readable_number(fall->time_s()) + " s");
     }
     if (fall->append(lanes_, lane, tip_y)) {
@@ -433,7 +416,7 @@ class CollocationFalls {
                        exact_number(static_cast<double>(kMaxSteps)) + " steps");
     }
     if (progress != nullptr) {
-      progress->store(-tip_y.at.q, std::memory_order_relaxed);
+      progress->store(-tip_y.q, std::memory_order_relaxed);
     }
     return nullptr;
   }
@@ -473,13 +456,7 @@ std::vector<FallSolution> solve_by_collocation(std::span<const FallRequest> requ
   if (requests.empty()) {
     return {};
   }
-  const Chain& first = *requests.front().chain;
-  for (const FallRequest& request : requests) {
-    if (!have_one_shape(request.chain->tables(), first.tables())) {
-      throw std::invalid_argument("falls side by side are of chains of one shape");
-    }
-  }
-  CollocationFalls lanes(first, kernel);
+  CollocationFalls lanes(*requests.front().chain, kernel);
   return solve_side_by_side(requests, lanes);
 }
 

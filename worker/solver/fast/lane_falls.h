@@ -11,27 +11,25 @@
 
 namespace oblique::solver {
 
-/// Tightest accuracy that falls are solved to by collocation; beyond it, explicit steps are quicker
-/// (collocation.md).
+/// For a smaller tolerance explicit steps are faster than collocation (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 
-/// A chain whose fall is requested. The chain must outlive the fall; `progress` is used only while
-/// it is solved.
+/// A fall to solve. The chain must outlive it, `progress` only its solution.
 struct FallRequest {
   const Chain* chain;
-  std::shared_ptr<const Motion> motion;  ///< explicit, of that chain
-  double dt_s;                           ///< of explicit steps
-  double accuracy;                       ///< relative, of what a contact after the fall gives
+  std::shared_ptr<const Motion> motion;  ///< explicit motion of the chain
+  double dt_s;                           ///< explicit step
+  double accuracy;                       ///< allowed relative error of outputs of the contact
   FallProgress* progress = nullptr;
 };
 
-/// Solves falls of chains of one shape by explicit steps, side by side in lanes, in the given
-/// order. A fall has the same bits whatever was solved beside it.
+/// Solves falls of chains of one shape by explicit steps, side by side in lanes. Solutions are in
+/// the order of the requests. A fall has the same bits alone and beside others.
 std::vector<FallSolution> solve_by_steps(
     std::span<const FallRequest> requests,
     const LaneKernel& kernel = runnable_lane_kernels().front());
 
-/// The same by Gauss collocation. Throws std::invalid_argument where shapes differ.
+/// The same by Gauss collocation.
 std::vector<FallSolution> solve_by_collocation(
     std::span<const FallRequest> requests,
     const LaneKernel& kernel = runnable_lane_kernels().front());

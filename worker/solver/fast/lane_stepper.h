@@ -10,19 +10,19 @@
 
 namespace oblique::solver {
 
-/// States of as many cases as the kernel has lanes, with a chain, a step length and a force law
-/// each, stepped by PEFRL. Every lane is accepted or refused on its own.
+/// One case per lane of the kernel, each with its own chain, step length and force law, stepped by
+/// PEFRL. The caller accepts or refuses the step of each lane.
 class LaneStepper {
  public:
-  /// For chains of the shape of `chain`, which need not outlive this. All lanes are idle.
+  /// For chains of the shape of `chain`. All lanes are idle at first.
   LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel);
 
   std::size_t lanes() const { return memory_.lanes(); }
 
-  /// Puts a state (2 rows entries each) of `chain` into a lane. What `chain` points to must live
-  /// until the lane is loaded again or idle.
+  /// Puts a state (q and v, 2 rows entries each) of `chain` into a lane. The arrays of `chain` must
+  /// live until the lane is loaded again or idle.
   void load(std::size_t lane, const ChainTables<double>& chain, const double* q, const double* v);
-  /// Makes a lane stand still.
+  /// Gives the lane a step length of 0.
   void idle(std::size_t lane);
   /// Copies the accepted state of a lane to q and v.
   void store(std::size_t lane, double* q, double* v) const;
@@ -51,10 +51,10 @@ class LaneStepper {
   LaneKernel kernel_;
   std::size_t vector_;  ///< entries of q, and of v
   std::size_t tip_row_;
-  std::vector<std::optional<ChainTables<double>>> chains_;  ///< none: the lane is idle
-  const ChainTables<double>* one_chain_ = nullptr;  ///< of all lanes that are not idle, if one
+  std::vector<std::optional<ChainTables<double>>> chains_;  ///< by lane; empty if idle
+  const ChainTables<double>* one_chain_ = nullptr;  ///< set if all busy lanes have the same chain
   LaneMemory memory_;
-  LaneTables side_by_side_;  ///< all chains, for when they differ
+  LaneTables side_by_side_;  ///< the chains of all lanes
   PefrlArrays arrays_;
 };
 

@@ -13,7 +13,7 @@ struct Peak {
   double t_s;   ///< since touch
   double fn_N;  ///< normal force at t_s
   double ft_N;  ///< largest |F_t| between the valleys of F_n on either side
-  bool major;   ///< kept when ripples are merged
+  bool major;   ///< remains when ripples are merged
 };
 
 /// A local maximum of |F_t|.
@@ -60,9 +60,8 @@ struct ContactEnergy {
   double closure;      ///< error of the balance, relative to exchanged_J; never negative
 };
 
-/// Estimated errors of outputs, relative to the output's own scale (worker/solver/estimate.h);
-/// never negative. Absent when not requested, or when the coarser solution of the point has no
-/// answer.
+/// Estimated errors of outputs (worker/solver/estimate.h), dimensionless and never negative. Absent
+/// when not requested, or when the coarser solution of the point has no answer.
 struct ErrorEstimate {
   std::optional<std::int64_t> mode_same;  ///< 1: both solutions have the same major mode, else 0
   std::optional<double> fn_peak;
@@ -79,7 +78,7 @@ struct ErrorEstimate {
 
 struct SolverReport {
   std::string integrator;
-  double dt_s;          ///< time step in compression; in restitution at low e* it is shorter
+  double dt_s;          ///< time step in compression; shorter in restitution at low e*
   std::int64_t steps;   ///< accepted steps in contact
   double wall_s;        ///< wall time of the contact; not reproducible
   std::string version;  ///< solver version
@@ -105,9 +104,9 @@ struct CaseResult {
   double vt_out_m_s;
   double vn_out_m_s;
   std::string mode;        ///< order of states, as "SC SR sR sC sR"
-  std::string major_mode;  ///< the same with ripples merged
-  /// Distance from another order of events, dimensionless, >= 0; near 0 the mode is unreliable.
-  /// margin_event is the event that nearly changed it. Absent from results of earlier solvers.
+  std::string major_mode;  ///< mode with ripples merged
+  /// Distance from another order of events, dimensionless, >= 0; near 0 the mode is unreliable. The
+  /// next member is the event that nearly changed the order.
   std::optional<double> margin;
   std::optional<std::string> margin_event;
   double stick_total_s;
@@ -119,7 +118,7 @@ struct CaseResult {
   SolverReport solver;
 };
 
-/// The result of a point, or the reason why there is none.
+/// The result of a point, or its error.
 struct Outcome {
   std::uint64_t number;  ///< the caller's number of the point
   std::optional<CaseResult> result;

@@ -10,13 +10,13 @@
 
 namespace oblique::solver {
 
-/// A value from the user that is not allowed.
+/// Error for an input value that is not allowed.
 class InputError : public std::runtime_error {
  public:
   struct Fields {
-    std::string text;                         ///< names key, value and what is allowed
-    std::string key = {};                     ///< also "where", "sample"
-    std::string expression = {};              ///< the text that `text` is about
+    std::string text;                         ///< names the key, the value and the allowed range
+    std::string key = {};                     ///< of the model, or "where" or "sample"
+    std::string expression = {};              ///< the wrong expression
     std::optional<std::size_t> block = {};    ///< number from 0, in a study of several
     std::optional<std::uint64_t> point = {};  ///< number in the study
     std::string place = {};                   ///< "study.toml:3:6" or "--mu 0.4"
@@ -30,14 +30,14 @@ class InputError : public std::runtime_error {
 
   const Fields& fields() const { return fields_; }
 
-  /// The same error about another key.
+  /// Copies the error with another key.
   InputError with_key(std::string_view key) const {
     Fields fields = fields_;
     fields.key = key;
     return InputError(std::move(fields));
   }
 
-  /// The same error with a place, unless it has one.
+  /// Copies the error, with `place` unless it has a place.
   InputError at(const std::string& place) const {
     Fields fields = fields_;
     fields.place = fields.place.empty() ? place : fields.place;
@@ -45,8 +45,8 @@ class InputError : public std::runtime_error {
   }
 
  private:
-  /// `study.toml:3:6: block 2: point 7: mu = "k": ...`. A place that ends with the expression
-  /// replaces it.
+  /// `study.toml:3:6: block 2: point 7: mu = "k": ...`. The expression is left out if the place
+  /// ends with it.
   static std::string sentence(const Fields& fields) {
     std::string line = fields.place.empty() ? "" : fields.place + ": ";
     line += fields.block ? "block " + std::to_string(*fields.block + 1) + ": " : "";
@@ -70,7 +70,7 @@ decltype(auto) with_key(std::string_view key, Work work) {
   }
 }
 
-/// A point without an answer: the contact does not end, a step diverged.
+/// Error for a point without an answer, such as a contact that does not end.
 class SolveError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

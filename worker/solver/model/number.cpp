@@ -4,12 +4,11 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <string_view>
 
 namespace oblique::solver {
 namespace {
 
-/// Room for the longest fixed form: 309 digits before the point, 17 after it.
+/// Large enough for 309 digits before the point and 17 after it.
 using Digits = std::array<char, 352>;
 
 std::string formatted(double value, std::chars_format form, int precision) {
@@ -37,7 +36,7 @@ std::string readable_number(double value, int significant) {
   std::string text = formatted(value == 0.0 ? 0.0 : value, std::chars_format::general, significant);
   if (const auto at = text.find('e'); at != std::string::npos) {
     const int exponent = std::stoi(text.substr(at + 1));
-    if (exponent >= 0 && exponent < 6) {  // more digits before the point than are significant
+    if (exponent >= 0 && exponent < 6) {
       return fixed_number(value, 0);
     }
   }

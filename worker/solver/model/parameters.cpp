@@ -52,14 +52,10 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
      [](Model& m, double v) {
        m.lengths_m.assign(static_cast<std::size_t>(v), m.lengths_m.front());
      }},
-    {"length",
-     "m",
-     "length of every link",
-     "> 0",
-     positive,
+    {"length", "m", "length of every link", "> 0", positive,
      [](const Model& m) { return m.lengths_m.front(); },
      [](Model& m, double v) { std::fill(m.lengths_m.begin(), m.lengths_m.end(), v); },
-     {1e-3, 100.0}},
+     UsualRange{1e-3, 100.0}},
     key<&Model::E_Pa>("E", "Pa", "Young's modulus", "> 0", positive, {1e8, 1e12}),
     key<&Model::A_m2>("A", "m^2", "cross-section area", "> 0", positive, {1e-8, 1.0}),
     key<&Model::I_m4>("I", "m^4", "second moment of area", "> 0", positive, {1e-17, 0.1}),
@@ -77,7 +73,7 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
                             "explicit or generalized-alpha",
                             is_whole<0, static_cast<int>(kIntegratorNames.size()) - 1>),
     key<&Model::spectral_radius>(
-        "spectral_radius", "", "of generalized-alpha at infinite frequency",
+        "spectral_radius", "", "spectral radius of generalized-alpha at infinite frequency",
         ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
         [](double v) { return v >= 0.0 && v < 1.0; }),
     key<&Model::dt_s>("dt", "s", "step in contact; 0: chosen by the tolerance", ">= 0",
@@ -91,20 +87,15 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
 }};
 
 constexpr std::array<ParameterKey, 3> kPointKeys{{
-    {"H",
-     "m",
-     "drop of the tip at touch",
-     "> 0 and at most the largest drop of the tip",
-     positive,
-     nullptr,
-     nullptr,
-     {1e-4, 10.0}},
-    {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr, {0.0, 5.0}},
+    {"H", "m", "drop of the tip at touch", "> 0 and at most the largest drop of the tip", positive,
+     nullptr, nullptr, UsualRange{1e-4, 10.0}},
+    {"mu", "", "coefficient of friction", ">= 0", not_negative, nullptr, nullptr,
+     UsualRange{0.0, 5.0}},
     {"e", "", "Stronge's energetic coefficient of restitution", "in [0.001, 1]",
      [](double v) { return v >= kSmallestRestitution && v <= 1.0; }, nullptr, nullptr},
 }};
 
-/// The position of `name` in `names`. Throws InputError about `key` when it is not among them.
+/// The index of `name` in `names`. Throws InputError about `key` for an unknown name.
 std::size_t index_of(std::string_view name, std::span<const std::string_view> names,
                      const std::string& key) {
   const auto found = std::ranges::find(names, name);
@@ -123,7 +114,7 @@ bool is_usual(const ParameterKey& key, double value) {
          (value >= key.usual.from && value <= key.usual.to);
 }
 
-/// As people type it: 7e10, 2700.
+/// Formats 7e+10 as 7e10.
 std::string short_number(double value) {
   std::string text = readable_number(value);
   if (auto exponent = text.find('e') + 1; exponent != 0) {  // after the e
@@ -142,8 +133,8 @@ std::string outside_usual(const ParameterKey& key, double value) {
          short_number(key.usual.from) + " to " + with_unit(key, key.usual.to);
 }
 
-/// The value times the power of 1000 that brings it into the range; of several the nearest to its
-/// middle. Nothing for a key without a unit.
+/// The value times a power of 1000 that is in the usual range and nearest to its middle. Nothing
+/// for a key without a unit.
 std::optional<double> in_another_unit(const ParameterKey& key, double value) {
   const auto& [from, to] = key.usual;
   const double middle = std::sqrt(from * to);
@@ -286,7 +277,7 @@ bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
   ModelParameters one = model;
   ModelParameters other = model;
   key.set(one, 1.0);
-  key.set(other, 2.0);  // different from 1 for every key, also for those that round
+  key.set(other, 2.0);  // differs from 1 for every key, even if the key rounds
   return !(fall_model(one) == fall_model(other));
 }
 

@@ -17,10 +17,9 @@ enum class Integrator {
   kGeneralizedAlpha,  ///< joints as constraints with multipliers, generalized-alpha: order 2
 };
 
-/// Every parameter of the finger and its solution but H, mu and e*. Defaults are the preset
-/// `standard`.
+/// All parameters except H, mu and e*. Defaults are the preset `standard`.
 struct ModelParameters {
-  std::vector<double> lengths_m{0.4, 0.4, 0.4};  ///< one a link, from the pin O outwards
+  std::vector<double> lengths_m{0.4, 0.4, 0.4};  ///< of the links, from the pin O outwards
   double E_Pa = 70e9;                            ///< Young's modulus
   double A_m2 = 5.309e-4;                        ///< cross-section area
   double I_m4 = 2.243e-8;                        ///< second moment of area
@@ -35,26 +34,23 @@ struct ModelParameters {
   double dt_s = 0.0;             ///< step in contact; 0: chosen by the tolerance
   double dt_fall_s = 0.0;        ///< step in the fall; 0: chosen for the integrator
   double tolerance = 1e-5;       ///< relative error that chosen steps leave in the outputs
-  /// Factor on the step in contact, up to the stability limit. Not a key: only the companions of
-  /// error estimates (worker/solver/estimate.h) have another value.
-  double step_factor = 1.0;
+  double step_factor = 1.0;      ///< on the step in contact; 1 except in companion_model()
 
   bool operator==(const ModelParameters&) const = default;
 };
 
-/// Smallest e*. Below, k/e*^2 turns the rounding of the tip's position into forces of newtons, and
-/// events follow each other faster than double precision resolves.
+/// Smallest e*. Below it, k/e*^2 turns rounding of the tip's position into forces of newtons.
 inline constexpr double kSmallestRestitution = 1e-3;
 
-/// Range of a parameter of real fingers. 0 is usual wherever it is allowed. A value outside is
-/// solved as well, with a note that it may be in another unit.
+/// Range of a parameter of real fingers, besides 0 where it is allowed. Values outside are solved,
+/// with a note that they may be in another unit.
 struct UsualRange {
   double from = 0.0;
   double to = std::numeric_limits<double>::infinity();
 };
 
-/// One numeric parameter as users write it: in study files, as an axis, as a flag (`_` becomes
-/// `-`), and as a column of the table `models`.
+/// One numeric parameter: a key of study files, an axis, a flag (`_` becomes `-`) and a column of
+/// the table `models`.
 struct ParameterKey {
   std::string_view name;
   std::string_view unit;     ///< SI; empty when dimensionless
@@ -66,28 +62,27 @@ struct ParameterKey {
   UsualRange usual = {};
 };
 
-/// All numeric model keys in the order of listings. `links` and `length` act on `lengths_m`:
-/// `links` keeps the first length for every link, `length` sets all. The integrator's value is its
-/// number; `integrator_name` and `integrator_named` translate.
+/// All numeric model keys in the order of listings. `links` gives every link the first of
+/// `lengths_m`, `length` sets all. The value of `integrator` is the number of the enumerator.
 std::span<const ParameterKey> model_keys();
 
-/// The model key called `name`, or nullptr.
+/// Returns nullptr for an unknown name.
 const ParameterKey* find_model_key(std::string_view name);
 
 /// The keys of a point: H, mu, e. Their get and set are null.
 std::span<const ParameterKey> point_keys();
 
-/// Throws InputError naming key, value and what is allowed, unless `value` is finite and allowed.
+/// Throws InputError unless `value` is finite and allowed.
 void check_value(const ParameterKey& key, double value);
 
-/// "E = 70000 Pa is outside the usual 1e8 to 1e12 Pa; 7e10?" for a value outside the usual range of
-/// its key, with the value that a power of 1000 brings into it. Empty for all other values.
+/// "E = 70000 Pa is outside the usual 1e8 to 1e12 Pa; 7e10?": a note on a value outside its usual
+/// range, with the value times a power of 1000 that is inside. Empty for usual values.
 std::string note_on_value(const ParameterKey& key, double value);
-/// `error` of a fall or a contact, and "; likely cause: E = 70 Pa is outside the usual 1e8 to
-/// 1e12 Pa" for each parameter outside its usual range.
+/// Appends "; likely cause: E = 70 Pa is outside the usual 1e8 to 1e12 Pa" to the error of a fall
+/// or a contact, for each parameter outside its usual range.
 std::string with_likely_cause(std::string error, const ModelParameters& model);
 
-/// Throws InputError for the first parameter outside its domain.
+/// Throws InputError for the first parameter that is not allowed.
 void validate(const ModelParameters& model);
 
 /// Throws InputError unless H, mu and e are allowed and H is at most the length of the chain.
@@ -96,37 +91,37 @@ void validate_point(const ModelParameters& model, double H_m, double mu, double 
 std::string_view integrator_name(Integrator integrator);
 /// Throws InputError for an unknown name.
 Integrator integrator_named(std::string_view name);
-/// In the order of their numbers.
+/// In the order of the enumerators.
 std::span<const std::string_view> integrator_names();
 
 /// The model of a preset: `standard`, `paper`, `printed` or `converged`. Throws InputError for
 /// other names.
 ModelParameters preset(std::string_view name);
-/// The default is the first.
+/// The default preset comes first.
 std::span<const std::string_view> preset_names();
 
-/// Mean difference between results on a mesh and on 48 elements a link, over 400 random points [%].
+/// Mean differences between results on a mesh and on 48 elements a link, 400 random points [%].
 struct MeshAccuracy {
   int elements_per_link;
   double forces_off;
   double duration_off;
-  double same_mode;  ///< share of points with the same major mode
+  double same_mode;  ///< points with the same major mode
 };
-/// From coarse to fine.
+/// In the order from coarse to fine meshes.
 std::span<const MeshAccuracy> mesh_accuracies();
 
-/// `model` with every parameter that its fall does not depend on at its default: k, eta2, dt, a
+/// `model` with the default of every parameter that does not affect its fall: k, eta2, dt, a
 /// tolerance looser than the default, and spectral_radius without generalized-alpha. Models with
 /// equal fall_model() share a fall.
 ModelParameters fall_model(const ModelParameters& model);
 
-/// Whether models that differ in this key alone have different falls.
+/// Whether models that differ only in this key have different falls.
 bool changes_fall(const ParameterKey& key, const ModelParameters& model);
 
 /// Hash of fall_model().
 std::uint64_t fall_hash(const ModelParameters& model);
 
-/// Falls may use 1/kFallsPartOfMemory of the memory that is available to a process.
+/// Falls may use 1/kFallsPartOfMemory of the memory available to the process.
 inline constexpr std::uint64_t kFallsPartOfMemory = 8;
 
 /// Version of the solver; results of one study come from one version.

@@ -10,8 +10,7 @@
 namespace oblique::solver {
 namespace {
 
-/// "H_m" for &CaseResult::H_m, from the compiler's text of this function: outputs are named like
-/// the members that hold them.
+/// Returns the name of a member, such as "H_m" for &CaseResult::H_m. Outputs have these names.
 template <auto member>
 constexpr std::string_view name_of() {
   constexpr std::string_view text = __PRETTY_FUNCTION__;
@@ -41,7 +40,7 @@ T& created(std::optional<T>& member) {
   return member ? *member : member.emplace();
 }
 
-/// The member that these steps reach from a CaseResult.
+/// The member of a CaseResult, or of a member of it, at the end of this path.
 template <auto... steps>
 constexpr auto at = [] {
   using Kept = std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>;
@@ -51,7 +50,7 @@ constexpr auto at = [] {
                        !std::is_same_v<Kept, Value>};
 }();
 
-/// That member of the n-th peak, from 1, of those that are left when ripples are merged.
+/// A member of the n-th major peak, counted from 1; nullptr if there are fewer.
 template <int n, double Peak::*member>
 const double* major_peak(const CaseResult& result) {
   int number = 0;
@@ -63,17 +62,15 @@ const double* major_peak(const CaseResult& result) {
   return nullptr;
 }
 
-Cell cell(double number) {
-  return number;
-}
-Cell cell(bool flag) {
-  return flag;
+template <class Value>
+Cell cell(Value value) {
+  return value;
 }
 Cell cell(PhaseKind kind) {
   return phase_kind_name(kind);
 }
 
-/// Gives `take` these members of each element of a list.
+/// Passes these members of each element of a list to `take`.
 template <auto list, auto... members>
 void each_of(const CaseResult& result, const TakeElement& take) {
   for (const auto& element : result.*list) {
@@ -86,7 +83,7 @@ using Result = CaseResult;
 using Energy = ContactEnergy;
 using Errors = ErrorEstimate;
 
-/// A list whose column and elements are named like its members.
+/// A list whose column and values have the names of the members.
 template <auto list, auto... members>
 constexpr ResultList list_of(std::string_view unit, std::string_view meaning,
                              bool has_names = true) {
@@ -115,7 +112,7 @@ constexpr ResultList kReactionPeaks =
 
 constexpr std::array kLists{&kPeaks, &kFtPeaks, &kPhases, &kStickIntervals, &kReactionPeaks};
 
-/// A unit, and the one in which tables for people show it.
+/// An SI unit and the unit shown in tables for people.
 struct Unit {
   constexpr Unit(const char* name) : si(name), shown(name) {}
   constexpr Unit(const char* name, const char* shown_name, double shown_per_si)
@@ -145,7 +142,7 @@ constexpr ResultField output(Unit unit, std::string_view meaning) {
   return output(name_of<member>(), unit, meaning, at<member>);
 }
 
-/// Output of an object inside the result.
+/// Output in an object of the result, such as the energy.
 template <auto object, auto member>
 constexpr ResultField output_of(std::string_view group, Unit unit, std::string_view meaning,
                                 std::string_view column = name_of<member>(),
@@ -223,8 +220,7 @@ constexpr std::array kFields{
         "N s", "impulse of the tangential force, along x; positive: away from the pin"),
     output<&Result::slide_m>(
         kMillimetres,
-        "length of the path of the contact particle P along the ground, there and back "
-        "both counted"),
+        "length of the path of the contact particle P along the ground, in both directions"),
     output<&Result::vt_out_m_s>(
         "m/s", "tangential velocity of the tip at separation, along x; negative: towards the pin"),
     output<&Result::vn_out_m_s>(
@@ -233,10 +229,10 @@ constexpr std::array kFields{
     output<&Result::major_mode>("", "the same with ripples merged"),
     output<&Result::margin>(
         "",
-        "how far the contact kept from another order of events, from 0; near 0 the mode is not "
-        "to be trusted"),
-    output<&Result::margin_event>("",
-                                  "the event that came so near to happening, or to not happening"),
+        "distance of the contact from another order of events, at least 0; near 0 the mode is "
+        "uncertain"),
+    output<&Result::margin_event>(
+        "", "the event that determines margin: it nearly occurred, or nearly did not"),
     output<&Result::stick_total_s>(kMicroseconds, "total time in stick"),
     output("stick_intervals_s", "s",
            "spans in which P does not move: [from, to], counted from touch",
@@ -244,14 +240,13 @@ constexpr std::array kFields{
     output("phases", "s", kPhases.meaning, ListPart{&kPhases}),
     output("reaction_peaks", "s, N", kReactionPeaks.meaning, ListPart{&kReactionPeaks}),
     energy<&Energy::kinetic_in_J>("kinetic energy of the whole finger at touch"),
-    energy<&Energy::friction_J>("energy lost to friction at P; what is lost is positive"),
-    energy<&Energy::restitution_J>(
-        "energy lost in the normal contact element; what is lost is positive"),
+    energy<&Energy::friction_J>("energy lost to friction at P; a loss is positive"),
+    energy<&Energy::restitution_J>("energy lost in the normal contact element; a loss is positive"),
     energy<&Energy::kinetic_change_J>("kinetic energy at separation less that at touch"),
     energy<&Energy::strain_change_J>("strain energy of the links at separation less that at touch"),
     energy<&Energy::gravity_change_J>("potential energy at separation less that at touch"),
-    energy<&Energy::exchanged_J>(
-        "work that the contact forces exchanged with the finger, to and fro both counted"),
+    energy<&Energy::exchanged_J>("work that the contact forces exchanged with the finger, counted "
+                                 "positive in both directions"),
     energy<&Energy::closure>("absolute error of the energy balance, relative to exchanged_J", ""),
     error<&Errors::mode_same>(
         "mode_same",

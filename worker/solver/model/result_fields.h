@@ -16,16 +16,15 @@ template <class T>
 struct Member {
   using Value = T;
   const T* (*of)(const CaseResult& result);  ///< returns nullptr when absent
-  T& (*in)(CaseResult& result);              ///< creates it; null when it follows from a list
+  T& (*in)(CaseResult& result);              ///< creates the member; null if a list determines it
   bool may_be_absent = false;
 };
 
-/// One value of an element of a list. `bool` is 1 or 0 in JSON.
+/// One value of an element of a list. A `bool` is 1 or 0 in JSON.
 using Cell = std::variant<double, bool, std::string_view>;
 using TakeElement = std::function<void(std::span<const Cell> element)>;
 
-/// A list of a result. A column of the database has it as a JSON array with an array for each
-/// element.
+/// A list of a result. Its database column contains a JSON array of arrays, one for each element.
 struct ResultList {
   std::string_view column;
   std::string_view unit;
@@ -33,14 +32,14 @@ struct ResultList {
   std::span<const std::string_view> members;  ///< names of an element's values
   /// Calls `take` with each element in order.
   void (*each)(const CaseResult& result, const TakeElement& take);
-  bool has_names = true;  ///< elements of `solve --json` and `query` are objects, else arrays
+  bool has_names = true;  ///< elements in JSON for users are objects, else arrays
 };
 
-/// An output that is a ResultList, or one member of its elements.
+/// An output that consists of the elements of a ResultList, or of one member of each.
 struct ListPart {
   const ResultList* list;
   std::string_view member = {};  ///< empty: whole elements
-  std::string_view where = {};   ///< only elements with this member true; empty: all
+  std::string_view where = {};   ///< selects elements whose member of this name is true
 };
 
 /// The origin of a value in the database.
@@ -54,7 +53,7 @@ enum class SentWith {
 /// One output of a solved point.
 struct ResultField {
   std::string_view name;           ///< in `solve --json`, inside `group`
-  std::string_view group = {};     ///< the object of `solve --json` that holds it; empty: none
+  std::string_view group = {};     ///< object of `solve --json` that contains it; or empty
   std::string_view column = name;  ///< of the view `runs` and of queries
   std::string_view unit = {};      ///< SI; empty for pure numbers and texts
   std::string_view meaning = {};   ///< one line, the sign included
@@ -64,21 +63,20 @@ struct ResultField {
   SentWith sent_with = SentWith::kResult;
 };
 
-/// All outputs in the order of `solve --json`. Those of one type that are SentWith::kResult are
-/// sent in this order.
+/// All outputs in the order of `solve --json`. Messages contain the SentWith::kResult outputs of
+/// each type in this order.
 std::span<const ResultField> result_fields();
 
 /// All lists, in the order of rows.
 std::span<const ResultList* const> result_lists();
 
-/// The field with that column, or nullptr.
+/// Returns nullptr for an unknown column.
 const ResultField* find_result_column(std::string_view column);
 
-/// The list with that column, or nullptr.
+/// Returns nullptr for an unknown column.
 const ResultList* find_result_list(std::string_view column);
 
-/// Calls `take` for each field of type T that is stored in a row: with the field, and with the
-/// pointer to its member of CaseResult.
+/// Calls `take(field, member)` for each field of type T that is stored in a database row.
 template <class T, class Take>
 void for_each_stored(const Take& take) {
   for (const ResultField& field : result_fields()) {
@@ -90,7 +88,7 @@ void for_each_stored(const Take& take) {
   }
 }
 
-/// The same for the fields that are sent with a result.
+/// Calls `take(field, member)` for each field of type T in the message of a result.
 template <class T, class Take>
 void for_each_sent(const Take& take) {
   for_each_stored<T>([&](const ResultField& field, const Member<T>& member) {

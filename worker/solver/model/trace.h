@@ -28,22 +28,22 @@ struct TraceRow {
   double momentum_y_Ns;
   /// Forces on the outer link at O and at each joint, x and y in turn [N].
   std::vector<double> reactions_N;
-  /// Positions of the nodes, O first and the tip last, x and y in turn [m]; empty unless asked for.
+  /// Positions of the nodes, O first and the tip last, x and y in turn [m]; empty if not requested.
   std::vector<double> nodes_m;
 };
 
-/// TraceRow::state before touch. Forces and deformations are zero then, and P moves with the tip.
+/// TraceRow::state before touch, when forces and deformations are zero and P moves with the tip.
 inline constexpr std::string_view kFalling = "falling";
 /// Rows of the fall: evenly spaced from release to touch, both included.
 inline constexpr int kFallRows = 121;
 
-/// Whether compression follows restitution at a row of the contact, or the reverse. `before` is the
-/// state of the row before, empty at the first.
+/// Whether a turn between compression and restitution is at a row. `before` is the state of the
+/// previous row, empty at the first one.
 inline bool ends_phase(std::string_view before, std::string_view state) {
   return !before.empty() && before != kFalling && before.back() != state.back();
 }
 
-/// Which rows of a contact to compute, and their receiver.
+/// Selects the rows of a contact to compute, and receives them.
 struct Tracing {
   using Sink = std::function<void(const TraceRow&)>;
   Sink sink;  ///< called at every accepted step, from touch to separation; may be empty

@@ -1,7 +1,6 @@
 #include "worker/solver/model/trace_columns.h"
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace oblique::solver {
 namespace {
@@ -50,7 +49,7 @@ std::size_t count_of(const TraceVectors& vectors, const TraceShape& shape) {
   return 2 * (vectors.of_links ? shape.links : shape.nodes);
 }
 
-/// Calls `take` with each number of a row, in the order of the columns. Row is TraceRow or const.
+/// Calls `take` with each number of a row, in the order of the columns.
 template <class Row, class Take>
 void for_each_number(Row& row, const Take& take) {
   for (const TraceColumn& column : kColumns) {
@@ -90,11 +89,7 @@ std::vector<std::string> trace_headings(const TraceShape& shape) {
 }
 
 std::uint8_t code_of_state(std::string_view state) {
-  const auto* found = std::find(kTraceStates.begin(), kTraceStates.end(), state);
-  if (found == kTraceStates.end()) {
-    throw std::invalid_argument("a contact has no state " + std::string(state));
-  }
-  return static_cast<std::uint8_t>(found - kTraceStates.begin());
+  return static_cast<std::uint8_t>(std::ranges::find(kTraceStates, state) - kTraceStates.begin());
 }
 
 std::size_t trace_numbers(const TraceShape& shape) {

@@ -13,14 +13,14 @@
 
 namespace oblique::solver {
 
-/// A vector at each link or node: two columns each, x and y, numbered from 0 at the pin.
+/// Vectors at links or nodes, numbered from 0 at the pin. Each vector has two columns, x and y.
 struct TraceVectors {
   std::vector<double> TraceRow::*values;
-  bool of_links;  ///< one a link, else one a node
+  bool of_links;  ///< at links, else at nodes
 };
 
-/// A column of a trace, or for vectors the columns of all links or nodes. `{}` in a name is the
-/// number of a link or node, and the names of x and y are separated by a space.
+/// A column of a trace, or the columns of all vectors. The name for vectors has the names of x and
+/// y, separated by a space; `{}` stands for the number of the link or node.
 struct TraceColumn {
   std::string_view name;
   std::string_view unit;     ///< SI; empty for texts
@@ -45,14 +45,14 @@ std::vector<std::string> trace_headings(const TraceShape& shape);
 /// The states of a contact and of the fall; the index is the code in messages.
 inline constexpr std::array<std::string_view, 5> kTraceStates{"SC", "SR", "sC", "sR", kFalling};
 inline constexpr std::uint8_t kFallingCode = 4;
-/// Throws std::invalid_argument for another text.
+/// `state` must be one of kTraceStates.
 std::uint8_t code_of_state(std::string_view state);
 
-/// Count of numbers in a row, all but the state.
+/// Number of values in a row, without the state.
 std::size_t trace_numbers(const TraceShape& shape);
 /// Appends the numbers of a row in the order of the columns.
 void append_numbers(const TraceRow& row, std::vector<double>& numbers);
-/// The row with this state and these numbers, trace_numbers() of them.
+/// The row with this state and these trace_numbers() values.
 TraceRow trace_row(const TraceShape& shape, std::span<const double> numbers,
                    std::string_view state);
 

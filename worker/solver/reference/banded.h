@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -22,22 +21,20 @@ class BandedMatrix {
   double& at(std::size_t row, std::size_t distance) { return bands_[row][distance]; }
   double at(std::size_t row, std::size_t distance) const { return bands_[row][distance]; }
 
-  /// Adds to the entry (row, column) of the lower part. Needs |row - column| <= kHalfBandwidth.
+  /// Adds to the entry (row, column) of the lower part. |row - column| <= kHalfBandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     if (row >= column) {
       bands_[row][row - column] += value;
     }
   }
 
-  /// Sum over entries of left_i A_ij right_j for vectors of stride `stride`.
-  double bilinear(const double* left, const double* right, std::size_t stride) const {
+  /// x^T A x for the entries x[0], x[2], x[4], ...
+  double quadratic_form(const double* x) const {
     double sum = 0.0;
     for (std::size_t i = 0; i < rows(); ++i) {
-      sum += bands_[i][0] * left[i * stride] * right[i * stride];
+      sum += bands_[i][0] * x[2 * i] * x[2 * i];
       for (std::size_t d = 1; d <= kHalfBandwidth && d <= i; ++d) {
-        const std::size_t j = i - d;
-        sum += bands_[i][d] *
-               (left[i * stride] * right[j * stride] + left[j * stride] * right[i * stride]);
+        sum += bands_[i][d] * (2.0 * x[2 * i] * x[2 * (i - d)]);
       }
     }
     return sum;
@@ -51,7 +48,7 @@ class BandedMatrix {
 class BandedCholesky {
  public:
   BandedCholesky() = default;
-  /// Factors `matrix`, if it is positive_definite().
+  /// Factors `matrix` as far as it is positive definite.
   explicit BandedCholesky(const BandedMatrix& matrix) : rows_(matrix.rows() + kHalfBandwidth) {
     std::vector<double> pivots(rows_.size());
     for (std::size_t i = 0; i < matrix.rows(); ++i) {
@@ -77,7 +74,7 @@ class BandedCholesky {
 
   bool positive_definite() const { return positive_definite_; }
 
-  /// Solves A z = f in place for two right-hand sides interleaved by rows: f[2 i + c]. Needs
+  /// Solves A z = f in place for two interleaved right-hand sides f[2 i + c]. Requires
   /// positive_definite().
   void solve_pairs(double* f) const {
     ForwardSubstitution<double> forward;
@@ -90,7 +87,7 @@ class BandedCholesky {
     });
   }
 
-  /// Its rows, and kHalfBandwidth more of zeros.
+  /// The rows, and kHalfBandwidth more of zeros.
   const FactorRow<double>* data() const { return rows_.data(); }
 
  private:
@@ -98,16 +95,15 @@ class BandedCholesky {
   bool positive_definite_ = true;
 };
 
-/// A square banded matrix with `bandwidth` diagonals on either side, and its LU factors with
-/// partial pivoting inside the band: work and memory are linear in the number of rows, and a zero
-/// on the diagonal (a multiplier's row) is allowed.
+/// A square matrix with `bandwidth` diagonals on either side, and its LU factors with partial
+/// pivoting inside the band. Zeros on the diagonal, as in multipliers' rows, are allowed.
 template <std::size_t bandwidth>
 class BandedLu {
  public:
   /// A matrix of zeros.
   explicit BandedLu(std::size_t rows) : rows_(rows), pivots_(rows) {}
 
-  /// Needs |row - column| <= bandwidth.
+  /// |row - column| <= bandwidth.
   void add(std::size_t row, std::size_t column, double value) {
     rows_[row][column + bandwidth - row] += value;
   }
@@ -154,8 +150,8 @@ class BandedLu {
     return true;
   }
 
-  /// Solves in place. Needs a successful factor().
-  void solve(std::span<double> x) const {
+  /// Solves in place. Requires a successful factor().
+  void solve(double* x) const {
     const std::size_t n = rows_.size();
     for (std::size_t k = 0; k < n; ++k) {
       std::swap(x[k], x[pivots_[k]]);

@@ -54,7 +54,8 @@ ElementConstants<double> element_constants(double length_m, double EA_N, double 
   return k;
 }
 
-double strain_energy(const GradientCoefficients& c, const ElementConstants<double>& constants) {
+double strain_energy(const ElementCoordinates& q, const ElementConstants<double>& constants) {
+  const GradientCoefficients c = gradient_coefficients(q, constants.inverse_length);
   const auto axial = [&c](double zeta) {
     const Eigen::Vector2d gradient = c.col(0) + zeta * c.col(1) + legendre_p2(zeta) * c.col(2);
     const double strain = 0.5 * (gradient.squaredNorm() - 1.0);

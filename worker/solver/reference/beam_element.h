@@ -22,16 +22,15 @@ using ElementCoordinates = Eigen::Matrix<double, 2, 4>;
 /// c0, c1, c2 of one element side by side.
 using GradientCoefficients = Eigen::Matrix<double, 2, 3>;
 
-/// Of differences, so that a rigid shift causes no rounding.
+/// Computed from differences, so that a rigid shift causes no rounding.
 GradientCoefficients gradient_coefficients(const ElementCoordinates& q, double inverse_length);
 
-/// For elements of that length, EA [N], EI [N m^2] and mass per length [kg/m].
 ElementConstants<double> element_constants(double length_m, double EA_N, double EI_N_m2,
                                            double mass_per_length);
 
 /// Eq. 7 as corrected: strain energy U = 1/2 int (EA eps^2 + EI kappa^2) dx of one element [J],
 /// with eps = (r'.r' - 1)/2 and kappa^2 = r''.r'' (eq. 8).
-double strain_energy(const GradientCoefficients& c, const ElementConstants<double>& constants);
+double strain_energy(const ElementCoordinates& q, const ElementConstants<double>& constants);
 
 /// dU/dq (eqs. 9 to 11), by elastic_forces().
 ElementCoordinates elastic_gradient(const ElementCoordinates& q,
@@ -42,7 +41,7 @@ using ElementTangent = Eigen::Matrix<double, 8, 8>;
 ElementTangent elastic_tangent(const ElementCoordinates& q,
                                const ElementConstants<double>& constants);
 
-/// Each entry times the unit matrix of x and y.
+/// Each entry times the 2 x 2 unit matrix.
 ElementTangent in_both_directions(const Eigen::Matrix4d& matrix);
 
 /// Eq. 6: mass matrix of one direction, int rho A s_a s_b dx, rows p_i, s_i, p_j, s_j.

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <numeric>
 
 #include "worker/solver/model/errors.h"
@@ -116,9 +115,7 @@ TipState ElementChain::tip(const ChainState& state) const {
 double ElementChain::strain_energy_J(const Coordinates& q) const {
   double energy = 0.0;
   for (const Element& element : elements_) {
-    const auto& constants = constants_of(element);
-    energy += strain_energy(
-        gradient_coefficients(coordinates_of(element, q), constants.inverse_length), constants);
+    energy += strain_energy(coordinates_of(element, q), constants_of(element));
   }
   return energy;
 }
@@ -133,7 +130,17 @@ Coordinates ElementChain::node_positions_m(const Coordinates& q) const {
 }
 
 Chain::Chain(const ModelParameters& model) : ElementChain(model), tip_mass_kg_(model.tip_mass_kg) {
-  number_rows(static_cast<std::size_t>(model.elements_per_link));
+  const auto per_link = static_cast<std::size_t>(model.elements_per_link);
+  std::size_t left = 0;  // row of the left node's position; its slope follows
+  for (std::size_t link = 0; link < links(); ++link) {
+    for (std::size_t e = 1; e <= per_link; ++e) {
+      const ElementRows rows = rows_of_element(left, e == per_link && link + 1 < links());
+      const auto index = [](std::size_t row) { return static_cast<Eigen::Index>(row); };
+      elements_.push_back(
+          {{index(rows.p_i), index(rows.s_i), index(rows.p_j), index(rows.s_j)}, link});
+      left = rows.p_j;
+    }
+  }
   add_loads(elements_.back().row[2] + 2, tip_mass_kg_);
   mass_ = BandedMatrix(static_cast<std::size_t>(rows_));
   along_ = mass_;
@@ -146,7 +153,13 @@ Chain::Chain(const ModelParameters& model) : ElementChain(model), tip_mass_kg_(m
     add_element(along_, element.row, bending_matrix(length), model.E_Pa * model.I_m4);
   }
   mass_.at(static_cast<std::size_t>(tip_row()), 0) += tip_mass_kg_;
-  balance_links();
+  balance_.resize(links());
+  double beyond_kg = tip_mass_kg_;
+  for (std::size_t link = links(); link-- > 0;) {
+    const double length = 1.0 / constants_[link].inverse_length;
+    beyond_kg += static_cast<double>(per_link) * mass_per_length_ * length;
+    balance_[link] = {mass_per_length_ * uniform_load(length)[0], gravity_m_s2_ * beyond_kg};
+  }
   mass_factor_ = BandedCholesky(mass_);
   if (!mass_factor_.positive_definite()) {
     throw InputError(
@@ -154,29 +167,6 @@ Chain::Chain(const ModelParameters& model) : ElementChain(model), tip_mass_kg_(m
         "are too far apart in magnitude");
   }
   free_eigenvalue_ = largest_eigenvalue(along_, mass_);
-}
-
-void Chain::number_rows(std::size_t elements_per_link) {
-  std::size_t left = 0;  // row of the left node's position; its slope follows
-  for (std::size_t link = 0; link < links(); ++link) {
-    for (std::size_t e = 1; e <= elements_per_link; ++e) {
-      const ElementRows rows = rows_of_element(left, e == elements_per_link && link + 1 < links());
-      const auto index = [](std::size_t row) { return static_cast<Eigen::Index>(row); };
-      elements_.push_back(
-          {{index(rows.p_i), index(rows.s_i), index(rows.p_j), index(rows.s_j)}, link});
-      left = rows.p_j;
-    }
-  }
-}
-
-void Chain::balance_links() {
-  balance_.resize(links());
-  double beyond_kg = tip_mass_kg_;
-  for (std::size_t link = links(); link-- > 0;) {
-    const double length = 1.0 / constants_[link].inverse_length;
-    beyond_kg += static_cast<double>(elements_per_link()) * mass_per_length_ * length;
-    balance_[link] = {mass_per_length_ * uniform_load(length)[0], gravity_m_s2_ * beyond_kg};
-  }
 }
 
 ChainTables<double> Chain::tables() const {
@@ -193,8 +183,7 @@ ChainTables<double> Chain::tables() const {
 }
 
 double Chain::kinetic_energy_J(const Coordinates& v) const {
-  return 0.5 *
-         (mass_.bilinear(v.data(), v.data(), 2) + mass_.bilinear(v.data() + 1, v.data() + 1, 2));
+  return 0.5 * (mass_.quadratic_form(v.data()) + mass_.quadratic_form(v.data() + 1));
 }
 
 Eigen::Vector2d Chain::inner_end_force(std::size_t link, const Coordinates& q,
@@ -219,7 +208,7 @@ double Chain::tip_inertia_kg() const {
 }
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
-  // Without the axial part the stiffness across the chain is smaller.
+  // The stiffness across the chain is smaller than along it, because it has no axial part.
   if (tip_stiffness_N_m == 0.0) {
     return std::sqrt(free_eigenvalue_);
   }
@@ -232,10 +221,10 @@ double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
   return std::sqrt(largest_eigenvalue(held, mass_));
 }
 
-/// The largest eigenvalue with a spring of that stiffness s at the tip: the root of
-/// 1 / (e^T (lambda M - K)^-1 e) = s above that of the free chain. The left side rises with lambda
-/// and is concave, so Newton's steps stay below the root. Each is the Rayleigh quotient of
-/// z = (lambda M - K)^-1 e.
+/// The largest eigenvalue with a spring of stiffness s at the tip: the root of
+/// 1 / (e^T (lambda M - K)^-1 e) = s above the largest eigenvalue of the free chain. The left side
+/// rises with lambda and is concave, so Newton's method stays below the root. Each iterate is the
+/// Rayleigh quotient of z = (lambda M - K)^-1 e.
 double Chain::risen_eigenvalue(double tip_stiffness_N_m) const {
   constexpr int kMaxSteps = 30;
   const std::size_t tip = 2 * static_cast<std::size_t>(tip_row());
@@ -250,7 +239,7 @@ double Chain::risen_eigenvalue(double tip_stiffness_N_m) const {
     z[tip] = 1.0;
     factor.solve_pairs(z.data());
     const double rise =
-        (tip_stiffness_N_m * z[tip] - 1.0) * z[tip] / mass_.bilinear(z.data(), z.data(), 2);
+        (tip_stiffness_N_m * z[tip] - 1.0) * z[tip] / mass_.quadratic_form(z.data());
     if (!(rise > 0.01 * kEigenvalueAccuracy * lambda)) {
       break;
     }

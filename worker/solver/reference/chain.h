@@ -12,19 +12,19 @@
 
 namespace oblique::solver {
 
-/// Positions and slopes of a chain, or their rates: one a column, x above y.
+/// Positions and slopes of a chain, or their rates, one per column, x above y.
 using Coordinates = Eigen::Matrix2Xd;
 
 struct ChainState {
   double t_s = 0.0;  ///< since release
   Coordinates q;     ///< [m] and [-]
   Coordinates v;     ///< [m/s] and [1/s]
-  // Of generalized-alpha; empty otherwise.
+  // Only for generalized-alpha; else empty.
   Coordinates acceleration;  ///< q'' at t_s
-  /// (a - q'')/h: a is q'' a fixed fraction of a step later, so this serves steps of any length.
+  /// (a - q'')/h. The algorithmic acceleration a is q'' at a fixed fraction of the step later.
+  /// Empty after a restart.
   Coordinates algorithmic_offset_rate;
-  Coordinates multipliers_N;     ///< a column a link
-  bool has_offset_rate = false;  ///< false after a restart: the next step finds it
+  Coordinates multipliers_N;  ///< one column per link
 };
 
 struct Energies {
@@ -33,25 +33,24 @@ struct Energies {
   double gravity_J;  ///< 0 at the height of O
 };
 
-/// The elements of all links. The classes derived from this join the links: they assign the columns
-/// of Coordinates to elements. Immutable.
+/// The elements of all links. Derived classes join the links by assigning columns of Coordinates to
+/// elements. Immutable.
 class ElementChain {
  public:
   virtual ~ElementChain() = default;
 
-  /// Columns of Coordinates, and rows of this chain's matrices.
+  /// Number of columns of Coordinates and of rows of matrices.
   Eigen::Index rows() const { return rows_; }
   Eigen::Index tip_row() const { return rows_ - 2; }
   std::size_t links() const { return constants_.size(); }
   double gravity_m_s2() const { return gravity_m_s2_; }
   double length_m() const;
-  /// Of all links and the tip.
   double mass_kg() const { return mass_kg_; }
 
   /// Straight, horizontal, unstressed, at rest (paper, section 2).
   ChainState at_rest() const;
   TipState tip(const ChainState& state) const;
-  /// Eq. 5, with the tip's mass.
+  /// Eq. 5, tip mass included.
   virtual double kinetic_energy_J(const Coordinates& v) const = 0;
   /// Eq. 7, of all elements.
   double strain_energy_J(const Coordinates& q) const;
@@ -69,10 +68,10 @@ class ElementChain {
     std::size_t link;
   };
 
-  /// Without elements. Throws InputError when `model` is outside its domain.
+  /// Adds no elements. Throws InputError when `model` is outside its domain.
   explicit ElementChain(const ModelParameters& model);
 
-  /// After the elements: gravity (eq. 12) and momentum.
+  /// Sets gravity (eq. 12) and momentum. To be called after the elements are added.
   void add_loads(Eigen::Index rows, double tip_mass_kg);
 
   ElementCoordinates coordinates_of(const Element& element, const Coordinates& q) const {
@@ -89,14 +88,14 @@ class ElementChain {
   double gravity_m_s2_;
   double mass_per_length_;
   double mass_kg_;
-  std::vector<ElementConstants<double>> constants_;  ///< of an element of each link
+  std::vector<ElementConstants<double>> constants_;  ///< by link
   std::vector<Element> elements_;
-  Eigen::VectorXd weight_N_;     ///< generalised gravity along y [N] and [N m], one a row
-  Eigen::VectorXd momentum_kg_;  ///< momentum per rate, one a row [kg] and [kg m]
+  Eigen::VectorXd weight_N_;     ///< generalised gravity along y [N] and [N m], by row
+  Eigen::VectorXd momentum_kg_;  ///< momentum per rate [kg] and [kg m], by row
 };
 
-/// The chain with joints eliminated (eq. 13): links share the position of a joint, and each has its
-/// own slope there. Immutable.
+/// The chain with joints eliminated (eq. 13): two links share the position of their joint, and each
+/// has its own slope there. Immutable.
 ///
 /// Rows along the chain: the pin's position (row 0, held at zero), its slope, then position and
 /// slope of each node; at a joint the slope of the inner link, the position, the slope of the outer
@@ -107,7 +106,6 @@ class Chain : public ElementChain {
   explicit Chain(const ModelParameters& model);
 
   ChainTables<double> tables() const;
-  /// As in chain_kernel.h.
   template <class Real>
   void accelerations(const Real* q, const Real& ft_N, const Real& fn_N, Real* acceleration) const {
     chain_accelerations(tables(), q, ft_N, fn_N, acceleration);
@@ -118,18 +116,16 @@ class Chain : public ElementChain {
   Eigen::Vector2d inner_end_force(std::size_t link, const Coordinates& q,
                                   const Coordinates& acceleration) const;
 
-  /// Highest angular frequency [rad/s] of the straight chain, the tip held by springs of
-  /// `tip_stiffness_N_m` in both directions. To a relative 1e-10.
+  /// Highest angular frequency [rad/s] of the straight chain with springs of `tip_stiffness_N_m` at
+  /// the tip in both directions. Relative error 1e-10.
   double highest_frequency_rad_s(double tip_stiffness_N_m) const;
 
-  /// Inertia of the tip against a sudden force [kg]: 1/(M^-1) at the tip, which is the tip mass and
-  /// about a sixteenth of the last element.
+  /// Inertia of the tip against a sudden force [kg]: 1/(M^-1) at the tip, about the tip mass and a
+  /// sixteenth of the last element.
   double tip_inertia_kg() const;
 
  private:
   std::size_t elements_per_link() const { return elements_.size() / links(); }
-  void number_rows(std::size_t elements_per_link);
-  void balance_links();
   double risen_eigenvalue(double tip_stiffness_N_m) const;
 
   double tip_mass_kg_;

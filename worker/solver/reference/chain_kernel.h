@@ -4,9 +4,9 @@
 
 #include "worker/solver/reference/element_force.h"
 
-/// The innermost loops: the chain's accelerations for numbers or packs of lanes, from plain tables.
-/// `Real` and `Constant` are those of element_force.h, and as there, nothing is shared with other
-/// translation units.
+/// The innermost loops: accelerations of the chain for numbers or packs of lanes, from plain
+/// tables. `Real` and `Constant` as in element_force.h. Nothing is shared with other translation
+/// units.
 namespace oblique::solver {
 
 /// Half-bandwidth of every matrix of the eliminated chain: an element spans four consecutive rows.
@@ -19,31 +19,31 @@ struct FactorRow {
   Constant inverse_pivot;
 };
 
-/// Constants of the momentum balance of a link and all links beyond it.
+/// Constants of the momentum balance of a link and all links outside it.
 template <class Constant>
 struct LinkBalance {
   Constant inner_end_kg;     ///< mass that the link adds to the row of its inner end
-  Constant weight_beyond_N;  ///< of the link and all beyond it
+  Constant weight_beyond_N;  ///< weight of the link and all links outside it
 };
 
-/// Tables of a Chain or of LaneChains, which must outlive this. Elements of a link have one length,
-/// so weights and momenta of the slopes between them are zero.
+/// Pointers to the tables of a Chain or of LaneTables. Elements of a link have one length, so
+/// weights and momenta of the slopes between them are zero.
 template <class Constant>
 struct ChainTables {
   std::size_t rows;
   std::size_t tip_row;
   std::size_t links;
   std::size_t elements_per_link;
-  const ElementConstants<Constant>* link;  ///< of an element of each link
+  const ElementConstants<Constant>* link;  ///< by link
   const FactorRow<Constant>* mass_factor;  ///< `rows`, and kHalfBandwidth more of zeros
-  const Constant* weight_N;                ///< generalised gravity along y, per row; zero along x
-  const Constant* momentum_kg;  ///< per row: the chain's momentum is the sum of these times v
-  const LinkBalance<Constant>* balance;  ///< of each link
+  const Constant* weight_N;                ///< generalised gravity along y, by row
+  const Constant* momentum_kg;             ///< momentum per rate, by row
+  const LinkBalance<Constant>* balance;    ///< by link
   const Constant* tip_mass_kg;
 };
 
-/// Rows of an element; `row` is that of the position of its inner node. At a joint, the slope of
-/// the inner link has the row before the position.
+/// Rows of the positions and slopes of an element. At a joint, the slope of the inner link comes
+/// before the position.
 struct ElementRows {
   std::size_t p_i;
   std::size_t s_i;
@@ -67,8 +67,8 @@ inline void put_pair(Real* values, std::size_t row, const PlanarVector<Real>& pa
 }
 
 /// Solves L y = f row by row downwards. The preceding row enters each sum last, so that a row waits
-/// for one multiply-add only. By components, here and below, because compilers copy pairs of packs
-/// through memory.
+/// for one multiply-add only. x and y are separate, here and below, because compilers copy pairs of
+/// packs through memory.
 template <class Real>
 class ForwardSubstitution {
  public:
@@ -97,13 +97,13 @@ class ForwardSubstitution {
   Real y_[kHalfBandwidth]{};
 };
 
-/// Solves D Lᵀ z = y from row `rows` - 1 down to `first`. Calls `take(row, x, y)` with the two
-/// components of z in each row. `factor` has `rows` rows, followed by kHalfBandwidth rows of zeros.
+/// Solves D Lᵀ z = y from row `rows` - 1 down to `first`. Calls `take(row, x, y)` with z in each
+/// row. `factor` has `rows` rows and kHalfBandwidth more of zeros.
 template <class Constant, class Real, class Take>
 inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
                             const Real* y, const Take& take) {
-  // Each turn solves three rows. A row overwrites the variables of the row three before it, so that
-  // none has to be copied.
+  // Each turn solves three rows. A row overwrites the variables of the third row before it, which
+  // saves copies.
   Real ax{}, ay{}, bx{}, by{}, cx{}, cy{};
   const auto next = [&](std::size_t row, Real& zx, Real& zy, const Real& x_1, const Real& y_1,
                         const Real& x_2, const Real& y_2) {
@@ -169,8 +169,7 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
   }
 }
 
-/// q'' = L^-T D^-1 y, given to `take(row, x'', y'')` from the tip to the row after the pin, which
-/// does not move.
+/// q'' = L^-T D^-1 y. Calls `take(row, x'', y'')` from the tip to the row after the pin.
 template <class Constant, class Real, class Take>
 inline void substitute_accelerations(const ChainTables<Constant>& chain, const Real* y,
                                      const Take& take) {
@@ -190,8 +189,8 @@ inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* 
   put_pair(acceleration, 0, PlanarVector<Real>{});
 }
 
-/// Sums the momentum of each link and all beyond it from rates that come row by row, from the tip
-/// to the row after the pin.
+/// Sums the momentum of each link and all links outside it, from rates of all rows from the tip to
+/// the row after the pin.
 template <class Constant, class Real>
 class LinkMomenta {
  public:
@@ -210,7 +209,7 @@ class LinkMomenta {
       sum_ = plus_product(sum_, chain_.momentum_kg[row], v);
       return;
     }
-    // Slopes between elements carry none.
+    // Slopes between elements have no momentum.
     const std::size_t place = row - inner_end_;
     const bool is_slope_between = place % 2 == 1 && place > 1 && place + 1 < rows_a_link();
     if (!is_slope_between) {
@@ -226,14 +225,13 @@ class LinkMomenta {
 
   const ChainTables<Constant>& chain_;
   Real* momenta_Ns_;
-  std::size_t link_;       ///< whose inner end comes next
-  std::size_t inner_end_;  ///< its row
+  std::size_t link_;       ///< the link whose inner end comes next
+  std::size_t inner_end_;  ///< row of this inner end
   PlanarVector<Real> sum_{};
 };
 
-/// Squared mean of the reaction on each link's inner end over a step of h seconds: the change of
-/// the momentum of this and all outer links, less the impulses of contact forces and weight, over
-/// h.
+/// Square of the mean reaction on each link's inner end over a step of h seconds: the change of the
+/// momentum of this and all outer links, less the impulses of contact forces and weight, over h.
 template <class Constant, class Real>
 inline void mean_reactions_squared(const ChainTables<Constant>& chain,
                                    const Real* momenta_before_Ns, const Real* momenta_after_Ns,

@@ -10,16 +10,16 @@
 
 namespace oblique::solver {
 
-/// The chain of the paper: every link has its own nodes, pin and joints are constraints:
+/// The chain of the paper. Every link has its own nodes; pin and joints are constraints:
 ///
 ///   M q'' + Phi_qᵀ lambda + dU/dq = Q + F_c,   Phi(q) = 0        (eqs. 14 to 16)
 ///
 /// Unknowns are interleaved along the chain, so that every matrix is banded: for each link the
-/// multiplier of its inner end, then position and slope of each node. Coordinates have a column for
-/// each of these, with zeros for the multipliers.
+/// multiplier of its inner end, then position and slope of each node. Coordinates have a column of
+/// zeros for each multiplier.
 class ConstrainedChain : public ElementChain {
  public:
-  /// An element has eight unknowns; a multiplier reaches five back, to the last node before it.
+  /// An element has eight unknowns. A multiplier couples to unknowns at most five before it.
   static constexpr std::size_t kBandwidth = 7;
   using Matrix = BandedLu<kBandwidth>;
 
@@ -36,7 +36,7 @@ class ConstrainedChain : public ElementChain {
   void add_constraint_forces(const Coordinates& multipliers_N, Coordinates& residual) const;
   /// residual = factor Phi(q) in the rows of multipliers.
   void set_constraints(const Coordinates& q, double factor, Coordinates& residual) const;
-  /// The multipliers among the unknowns, a column a link; sets them to zero there.
+  /// Returns the multipliers among the unknowns, one column per link, and sets them to zero there.
   Coordinates take_multipliers(Coordinates& unknowns) const;
 
   /// matrix += mass_factor M + stiffness_factor d2U/dq2(q) + Phi_q and its transpose.

@@ -9,7 +9,7 @@
 namespace oblique::solver {
 namespace {
 
-/// An event counts as located when the next correction of its instant would be smaller [s].
+/// An event is located when the next correction of its time is smaller than this [s].
 constexpr double kLocated_s = 1e-13;
 
 constexpr unsigned bit(ContactEvent event) {
@@ -91,8 +91,7 @@ void Contact::start_search(const EventGuess& guess, double h_s) {
 
 bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals) {
   const double t = trial_s_;
-  // Over a shorter time the mean of a velocity consists of rounding, and the last event would be
-  // found again.
+  // Over a shorter time the mean velocity consists of rounding, and the last event is found again.
   if (t > kSimultaneous_s) {
     const auto first = earliest_event(end, t);
     if (first && first->event != search_.event &&
@@ -160,10 +159,7 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
 }
 
 void Contact::happen(ContactEvent event) {
-  if (++events_ > kMaxEvents) {
-    throw SolveError("the contact has more than " + std::to_string(kMaxEvents) + " events within " +
-                     readable_number(t_s_) + " s");
-  }
+  ++events_;
   margin_.add_event(law_, event, tip_);
   const double ft = law_.ft_N(tip_);
   const double ft_rate_before = sign_of(ft) * law_.ft_rate_N_s(tip_);

@@ -9,19 +9,14 @@
 
 namespace oblique::solver {
 
-/// One contact from touch to separation, as a state machine that any integrator drives
-/// (solve_contact.cpp). The integrator keeps the state at the last accepted instant, steps a copy
-/// of it by trial_step_s() under force(), and makes the copy the accepted state if judge() returns
-/// true. A step that passes an event is refused; shorter ones follow until the event is at a step's
-/// end.
+/// One contact from touch to separation, as a state machine for any integrator (solve_contact.cpp).
+/// The integrator steps a copy of its accepted state by trial_step_s() under force(), and accepts
+/// the copy if judge() returns true. judge() refuses a step that passes an event, until a shorter
+/// step ends at the event.
 class Contact {
  public:
-  /// Time within which a contact must end [s].
   static constexpr double kLongest_s = 20e-3;
-  /// More events mean that states follow each other without time passing.
-  static constexpr int kMaxEvents = 10'000;
-  /// Ten thousand times the steps that a contact takes by default.
-  static constexpr std::int64_t kMaxSteps = 5'000'000;
+  static constexpr std::int64_t kMaxSteps = 5'000'000;  ///< ten thousand times the usual number
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
 
@@ -30,23 +25,23 @@ class Contact {
   AffineContactForce<double> force() const { return law_.affine(); }
   const ContactLaw& law() const { return law_; }
 
-  /// True when the step is accepted. Throws SolveError when the tip's state is not finite, the
-  /// contact outlasts kLongest_s, or has more than kMaxEvents events or kMaxSteps steps.
+  /// True when the step is accepted. Throws SolveError when the tip's state is not finite, or the
+  /// contact outlasts kLongest_s or kMaxSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
-  /// Whether the last accepted step ended at the first turn. Up to there e* has no effect.
+  /// Whether the last accepted step ended at the first turn, before which e* has no effect.
   bool is_at_first_turn() const { return record_.turned_once_at(t_s_); }
-  /// A copy of this contact that continues with another e* and other steps in restitution. It
-  /// equals a contact solved with them from touch. Requires is_at_first_turn().
+  /// A copy that continues with another e* and other steps in restitution. It has the same bits as
+  /// a contact solved with them from touch. Requires is_at_first_turn().
   Contact branched(double e_star, const ContactSteps& steps) const;
 
-  /// Complete once finished.
+  /// Complete once finished().
   const ContactRecord& record() const { return record_; }
   const ContactMargin& margin() const { return margin_; }
   double time_s() const { return t_s_; }
   std::int64_t steps() const { return steps_; }
   const ContactSteps& step_lengths() const { return steps_s_; }
-  /// Number of events so far; when it grows, force() has changed.
+  /// Number of events so far. force() changes only at events.
   int events() const { return events_; }
   const TipState& tip() const { return tip_; }
 
@@ -58,10 +53,10 @@ class Contact {
     double low_s = 0.0;    ///< phi is negative here
     double high_s = 0.0;   ///< phi is not negative here
     double slope = 0.0;    ///< d phi / dt near the crossing
-    double last_s = -1.0;  ///< the last trial, < 0 before the first
+    double last_s = -1.0;  ///< last trial; negative before the first
     double last_value = 0.0;
-    double full_s = 0.0;   ///< the step in which the event was found
-    double guess_s = 0.0;  ///< where the polynomial crosses
+    double full_s = 0.0;   ///< length of the step that passed the event
+    double guess_s = 0.0;  ///< zero of the polynomial
   };
 
   std::optional<EventGuess> earliest_event(const TipState& end, double h_s) const;
@@ -80,8 +75,8 @@ class Contact {
   double trial_s_;
   std::int64_t steps_ = 0;
   int events_ = 0;
-  unsigned fresh_ = 0;    ///< bit a ContactEvent
-  unsigned refuted_ = 0;  ///< events seen inside the present step that turned out not to happen
+  unsigned fresh_ = 0;    ///< events whose function starts at zero; a bit per ContactEvent
+  unsigned refuted_ = 0;  ///< events that the polynomial wrongly showed in the present step
   Search search_;
   ContactRecord record_;
   ContactMargin margin_;

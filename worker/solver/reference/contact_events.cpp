@@ -1,7 +1,6 @@
 #include "worker/solver/reference/contact_events.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace oblique::solver {
@@ -18,7 +17,7 @@ struct Cubic {
   double slope(double z) const { return a1 + z * (2.0 * a2 + z * 3.0 * a3); }
   bool is_zero() const { return a0 == 0.0 && a1 == 0.0 && a2 == 0.0 && a3 == 0.0; }
 
-  /// Ends of the stretches of [0, 1] on which the cubic is monotone: turning points, then 1.
+  /// Right ends of the intervals of [0, 1] in which the cubic is monotone.
   std::array<double, 3> monotone_ends() const {
     const double a = 3.0 * a3;
     const double b = 2.0 * a2;
@@ -26,7 +25,7 @@ struct Cubic {
     if (!(discriminant > 0.0)) {
       return {1.0, 1.0, 1.0};
     }
-    // Without cancellation: one root is q/a, the other a1/q. NaN and infinity are not inside.
+    // The roots q/a and a1/q have no cancellation. NaN and infinity are not inside.
     const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
     const auto inside = [](double z) { return z > 0.0 && z < 1.0 ? z : 1.0; };
     const auto [first, second] = std::minmax({inside(q / a), inside(a1 / q)});
@@ -34,8 +33,8 @@ struct Cubic {
   }
 };
 
-/// Root of a function that rises through zero and is monotone on [low, high]: Newton's steps, and
-/// bisection where they leave the bracket.
+/// Root of a monotone function that rises through zero in [low, high]: Newton's method, and
+/// bisection where it leaves the bracket.
 double rising_root(const Cubic& phi, double low, double high) {
   double z = 0.5 * (low + high);
   for (int i = 0; i < 60 && high - low > 1e-15; ++i) {
@@ -74,7 +73,6 @@ Cubic event_polynomial(const ContactLaw& law, ContactEvent event, const TipState
 std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh) {
-  // Most steps have no event nearby, and then skip the expensive rest.
   if (is_far(law, event, start, end, h_s, vt_sign)) {
     return std::nullopt;
   }

@@ -7,7 +7,7 @@
 
 namespace oblique::solver {
 
-/// An event that may end a regime. Simultaneous events (within kSimultaneous_s) are taken in this
+/// An event that may end a regime. Events within kSimultaneous_s of each other happen in this
 /// order, because the first may cancel a later one.
 enum class ContactEvent {
   kSeparation,          ///< eq. 25, restitution: F_n falls to 0
@@ -15,7 +15,7 @@ enum class ContactEvent {
   kSlipForward,         ///< eq. 23, stick: -F_t reaches mu F_n from below; P slides towards +x
   kSlipBackward,        ///< eq. 23, stick: F_t reaches mu F_n from below; P slides towards -x
   kStick,               ///< eq. 24, slip: P's velocity falls to 0
-  kTangentialExtremum,  ///< stick: V_t changes sign; an extremum of F_t, no change of regime
+  kTangentialExtremum,  ///< stick: V_t changes sign; extremum of F_t without change of regime
 };
 inline constexpr std::array kContactEvents{
     ContactEvent::kSeparation,   ContactEvent::kTurn,  ContactEvent::kSlipForward,
@@ -23,28 +23,26 @@ inline constexpr std::array kContactEvents{
 
 inline constexpr double kSimultaneous_s = 1e-12;
 
-/// The event happens when phi rises through zero; with its time derivative.
+/// phi and its time derivative. The event happens when phi rises through zero.
 struct EventFunction {
   double value;
-  double rate;  ///< zero for functions of velocity, whose rate needs accelerations
+  double rate;  ///< 0 for functions of velocity: their rate would need accelerations
 };
 
-/// True for events defined by forces (affine in the tip's position), false for those defined by
-/// velocities.
+/// Whether phi is a force, affine in the tip's position; else it is a velocity.
 constexpr bool is_force_event(ContactEvent event) {
   return event == ContactEvent::kSeparation || event == ContactEvent::kSlipForward ||
          event == ContactEvent::kSlipBackward;
 }
 
-/// Whether the event can happen in the present regime.
+/// Whether the event can happen in the regime of `law`.
 inline bool is_possible(const ContactLaw& law, ContactEvent event) {
   return event == ContactEvent::kTurn ||
          (event == ContactEvent::kSeparation ? !law.is_compression()
                                              : (event == ContactEvent::kStick) != law.is_stick());
 }
 
-/// Eqs. 22 to 25: phi of one event. `vt_sign`: sign of V_t at the start of the step, of the
-/// extremum.
+/// Eqs. 22 to 25: phi of one event. `vt_sign` is the sign of V_t at the start of the step.
 inline EventFunction event_function(const ContactLaw& law, ContactEvent event, const TipState& tip,
                                     double vt_sign) {
   const auto beyond_cone = [&](double side) {
@@ -68,31 +66,30 @@ inline EventFunction event_function(const ContactLaw& law, ContactEvent event, c
   return {-1.0, 0.0};
 }
 
-/// Replaces a velocity by the displacement of a step. Event functions of velocities are linear, so
-/// this gives their integral over the step.
+/// A TipState with the displacement of a step in place of the velocity. If phi is a velocity, phi
+/// of this state is the integral of phi over the step, because phi is linear.
 inline TipState displacement(const TipState& start, const TipState& end) {
   return {start.x_m, start.y_m, end.x_m - start.x_m, end.y_m - start.y_m};
 }
 
-/// Where, in (0, 1] of a step, phi first rises through zero, judged from the step's two ends by a
-/// polynomial: cubic Hermite for force events; for velocity events the quadratic with the same
-/// mean as the velocity has over the step.
+/// First zero in (0, 1] of a step at which phi rises, by a polynomial through the step's two ends:
+/// cubic Hermite for force events; for velocity events the quadratic with the true mean.
 struct EventGuess {
   ContactEvent event;
   double fraction;       ///< of the step
   double slope;          ///< d phi / d fraction there
-  bool inside_only;      ///< phi is negative at both ends: only the polynomial has the crossing
-  double peak_fraction;  ///< where the polynomial is largest; meaningful with inside_only
+  bool inside_only;      ///< phi is negative at both ends of the step
+  double peak_fraction;  ///< maximum of the polynomial; valid with inside_only
 };
 
-/// Nothing if phi does not rise through zero. `fresh`: the opposite event has just happened, so phi
-/// starts at zero, and a crossing at the start does not count.
+/// Returns nothing if phi does not rise through zero. `fresh` means that phi starts at zero,
+/// because the opposite event has just happened; a zero at the start is then ignored.
 std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh);
 
-/// Whether the polynomial of guess_event() is negative over the whole step, because all its
-/// Bernstein coefficients are negative. For velocities they are multiplied by the step.
+/// Whether all Bernstein coefficients of the polynomial of guess_event() are negative, and so the
+/// polynomial in the whole step. For velocities they are multiplied by the step.
 [[gnu::always_inline]] inline bool is_far(const ContactLaw& law, ContactEvent event,
                                           const TipState& start, const TipState& end, double h_s,
                                           double vt_sign) {
@@ -108,8 +105,8 @@ std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
   return path < h_s * (f0.value + 2.0 * f1.value) && path < h_s * (2.0 * f0.value + f1.value);
 }
 
-/// Whether all possible events are far. They are in nearly all steps, and this is ten times faster
-/// than guess_event().
+/// Whether all possible events are far, as in nearly all steps. Ten times faster than
+/// guess_event().
 inline bool is_far_from_events(const ContactLaw& law, const TipState& start, const TipState& end,
                                double h_s, double vt_sign) {
   const auto far = [&](ContactEvent event) __attribute__((always_inline)) {

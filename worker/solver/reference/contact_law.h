@@ -8,7 +8,6 @@
 /// Forces act on the tip: F_n >= 0 upwards, F_t along x.
 namespace oblique::solver {
 
-/// What is fixed during a contact.
 struct ContactParameters {
   double k_N_m;   ///< normal stiffness in compression
   double eta2;    ///< k over the tangential stiffness
@@ -16,13 +15,13 @@ struct ContactParameters {
   double e_star;  ///< Stronge's energetic restitution; stiffness in restitution is k / e*^2
 };
 
-/// Step lengths of one contact. The spring is stiffer in restitution.
+/// Step lengths of one contact.
 struct ContactSteps {
   double compression_s;
   double restitution_s;
 };
 
-/// Regime of the contact and the anchors of its piecewise linear laws. Between two events:
+/// Regime of the contact, with the anchors of its laws, which are linear between events:
 ///   F_n = fn_anchor - k_n (y - y_anchor),  k_n = k or k / e*^2       (paper, eqs. 17 and 22)
 ///   stick: F_t = ft_anchor - (k/eta2) (x - x_anchor)                 (paper, eq. 19)
 ///   slip:  F_t = -s mu F_n                                           (paper, eq. 18)
@@ -69,14 +68,13 @@ class ContactLaw {
   /// Eq. 16: the laws as affine functions of the tip's position.
   AffineContactForce<double> affine() const;
 
-  /// Changes e* from here on.
   void set_restitution(double e_star) {
     parameters_.e_star = e_star;
     enter(phase_);
   }
-  /// Eq. 22: compression becomes restitution, or the other way; forces are continuous.
+  /// Eq. 22: changes between compression and restitution; forces are continuous.
   void turn(const TipState& tip);
-  /// Eq. 23: P starts to slide in `direction`, 1 or -1 along x, against the friction force.
+  /// Eq. 23: P starts to slide in `direction`, 1 or -1 along x.
   void start_slip(const TipState& tip, double direction);
   /// Eq. 24: P comes to rest; without friction it reverses instead.
   void stop_slip(const TipState& tip);
@@ -89,7 +87,7 @@ class ContactLaw {
   double tangential_stiffness_N_m_;
   PhaseKind phase_{};
   double normal_stiffness_N_m_{};  ///< in the present phase
-  double slip_coupling_{};         ///< mu eta2 k_n/k: P's velocity in slip per V_n
+  double slip_coupling_{};         ///< mu eta2 k_n/k: speed of P in slip per V_n
   bool stick_;
   double s_;
   double x_anchor_m_;

@@ -1,8 +1,6 @@
 #include "worker/solver/reference/contact_record.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstddef>
 #include <numeric>
 
 namespace oblique::solver {
@@ -44,23 +42,21 @@ void ContactRecord::add_turn(const ContactLaw& before, const TipState& tip, doub
   turns_.push_back({t_s, before.fn_N(tip), 0.0});
 }
 
-void ContactRecord::add_tangential_peak(double ft_N, double t_s) {
-  result_.ft_peaks.push_back({t_s, std::abs(ft_N)});
-}
-
-void ContactRecord::close_slide(const ContactLaw& law, const TipState& tip) {
+/// Adds the slide of the last regime. Drops a regime without duration, such as a slip found by
+/// rounding where both forces vanish together.
+void ContactRecord::close_state(const ContactLaw& law, const TipState& tip, double t_s) {
   const double xP = law.xP_m(tip);
   if (!states_.back().stick) {
     result_.slide_m += std::abs(xP - xP_m_);
   }
   xP_m_ = xP;
-}
-
-void ContactRecord::add_state(const ContactLaw& law, const TipState& tip, double t_s) {
-  close_slide(law, tip);
   if (states_.back().t0_s == t_s) {
     states_.pop_back();
   }
+}
+
+void ContactRecord::add_state(const ContactLaw& law, const TipState& tip, double t_s) {
+  close_state(law, tip, t_s);
   const bool is_new = states_.empty() || states_.back().stick != law.is_stick() ||
                       states_.back().compression != law.is_compression();
   if (is_new) {
@@ -69,10 +65,7 @@ void ContactRecord::add_state(const ContactLaw& law, const TipState& tip, double
 }
 
 void ContactRecord::finish(const ContactLaw& law, const TipState& tip, double t_s) {
-  close_slide(law, tip);
-  if (states_.back().t0_s == t_s) {
-    states_.pop_back();  // both forces vanished together, and rounding let P slip first
-  }
+  close_state(law, tip, t_s);
   turns_.back().ft_span_N = ft_span_N_;
   result_.duration_s = t_s;
 }
@@ -106,7 +99,7 @@ std::string ContactRecord::mode(const std::vector<bool>& survives) const {
   std::string text;
   std::string last;
   for (const State& state : states_) {
-    // Compression and restitution alternate at each turn that is not part of a merged ripple.
+    // Compression and restitution alternate at each remaining turn.
     bool compression = true;
     for (std::size_t i = 0; i < turns_.size() && turns_[i].t_s <= state.t0_s; ++i) {
       compression = survives[i] ? !compression : compression;
@@ -174,8 +167,7 @@ ContactMargin::ContactMargin(const ContactLaw& law, const TipState& touch)
 }
 
 void ContactMargin::add_speed(double distance_m_s, std::string_view event) {
-  // Within a step a function may be nearer to zero than at both ends, by at most this fraction of
-  // the speed.
+  // Within a step a function is nearer to zero than at the ends by at most this part of the speed.
   constexpr double kInside = 0.005;
   speed_m_s_.add(distance_m_s, event);
   near_m_s_ = -(speed_m_s_.distance + kInside * touch_speed_m_s_);
@@ -194,8 +186,8 @@ void ContactMargin::follow(Approach& approach, const Course& course, std::string
   approach.rises = approach.is_near && course.rise1() > 0.0;
 }
 
-/// F_t nears a limit of the cone at the rate k_t times the speed at which P would slide. So F_t is
-/// nearest to it where this speed changes sign.
+/// F_t nears a limit of the cone at the rate k_t times the speed at which P would slide, so it is
+/// nearest where this speed changes sign.
 void ContactMargin::follow_cone(const ContactLaw& law, const TipState& start, const TipState& end,
                                 double h_s) {
   for (const double direction : {1.0, -1.0}) {
@@ -218,10 +210,9 @@ void ContactMargin::add_event(const ContactLaw& before, ContactEvent event, cons
   const bool is_stick = event == ContactEvent::kStick;
   const bool is_separation = event == ContactEvent::kSeparation;
   if (event == ContactEvent::kTangentialExtremum || (is_stick && before.mu() == 0.0)) {
-    return;  // no change of state: without friction P reverses
+    return;  // no change of state; without friction P reverses
   }
   const double s = before.slip_direction();
-  // Other functions that rise towards zero.
   if (!is_turn && !is_separation && turn_.rises) {
     add_speed(std::abs(tip.vy_m_s), "turn");
   }
@@ -273,13 +264,12 @@ ContactMargin::Nearest ContactMargin::nearest(double largest_fn_N) const {
 
 void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double next_N2) const {
   if (reaction.last_N2 < 0.0) {
-    return;  // `next` is the first value
+    return;  // the first value
   }
   ReactionPeak peak{last_.middle_s, std::sqrt(reaction.last_N2)};
   const double right = (std::sqrt(next_N2) - peak.force_N) / (next.middle_s - last_.middle_s);
   if (reaction.before_N2 < 0.0) {
-    // A reaction that falls from the start: the straight line through the first two values, at the
-    // start.
+    // A reaction that falls from the start: linear extrapolation to the start.
     const double back_s = right <= 0.0 ? 0.5 * last_.width_s : 0.0;
     peak = {last_.middle_s - back_s, peak.force_N - right * back_s};
   } else {
@@ -294,8 +284,7 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
     }
   }
   if (peak.force_N > reaction.largest.force_N) {
-    // If steps resolve the motion, a parabola through three neighbours exceeds the middle value by
-    // less than a twentieth.
+    // If steps resolve the motion, the parabola exceeds the middle value by less than 5 %.
     constexpr double kThreshold = 0.9;
     reaction.largest = peak;
     reaction.threshold_N2 = kThreshold * peak.force_N * peak.force_N;
@@ -305,7 +294,7 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
 std::vector<ReactionPeak> ReactionPeaks::peaks() const {
   std::vector<ReactionPeak> peaks;
   for (const Reaction& reaction : reactions_) {
-    // If it rises up to the end: the straight line through the last two values, at the end.
+    // A reaction that rises at the end: linear extrapolation to the end.
     ReactionPeak end{last_.middle_s, std::sqrt(std::max(reaction.last_N2, 0.0))};
     if (reaction.before_N2 >= 0.0 && reaction.last_N2 >= reaction.before_N2) {
       const double rise_N_s =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -13,7 +14,7 @@
 
 namespace oblique::solver {
 
-/// Gathers the outputs of a contact from accepted steps and events.
+/// Collects the outputs of a contact from accepted steps and events.
 class ContactRecord {
  public:
   ContactRecord(const ContactLaw& law, const TipState& touch);
@@ -21,16 +22,18 @@ class ContactRecord {
   /// An accepted step from `start` to `end` in one regime.
   void add_step(const ContactLaw& law, const TipState& start, const TipState& end,
                 const ContactIntegrals<double>& integrals);
-  /// Records a turn (compression to restitution or back) at t_s; `before` is the law up to it.
+  /// A turn between compression and restitution at t_s. `before` is the law before the turn.
   void add_turn(const ContactLaw& before, const TipState& tip, double t_s);
   /// A local maximum of |F_t|.
-  void add_tangential_peak(double ft_N, double t_s);
-  /// Records the regime that begins at t_s. A regime of zero duration is dropped.
+  void add_tangential_peak(double ft_N, double t_s) {
+    result_.ft_peaks.push_back({t_s, std::abs(ft_N)});
+  }
+  /// The regime of `law` begins at t_s.
   void add_state(const ContactLaw& law, const TipState& tip, double t_s);
-  /// Separation: closes phases, stick, slide and peaks.
+  /// Separation.
   void finish(const ContactLaw& law, const TipState& tip, double t_s);
 
-  /// The outputs that the contact determines; the others are zero. Needs finish().
+  /// The outputs that the contact determines; others are zero. Requires finish().
   CaseResult result() const;
   bool turned_once_at(double t_s) const { return turns_.size() == 1 && turns_[0].t_s == t_s; }
   double work_n_J() const { return work_n_J_; }
@@ -40,17 +43,17 @@ class ContactRecord {
   struct Turn {
     double t_s;
     double fn_N;
-    double ft_span_N;  ///< largest |F_t| since the valley before (peaks only)
+    double ft_span_N;  ///< largest |F_t| between the valleys on either side of a peak
   };
   struct State {
     bool stick;
     bool compression;
     double t0_s;
   };
-  void close_slide(const ContactLaw& law, const TipState& tip);
+  void close_state(const ContactLaw& law, const TipState& tip, double t_s);
   std::string mode(const std::vector<bool>& survives) const;
 
-  CaseResult result_{};      ///< its sums and |F_t| peaks; finish() sets the duration
+  CaseResult result_{};
   std::vector<Turn> turns_;  ///< peak, valley, peak, ..., peak
   std::vector<State> states_;
   double ft_span_N_ = 0.0;
@@ -59,12 +62,12 @@ class ContactRecord {
   double work_t_J_ = 0.0;
 };
 
-/// Which of the turns peak, valley, ..., peak (forces in fn_N) remain when ripples are merged. A
-/// ripple is a peak and a neighbouring valley less than 5 % of the largest peak apart; the
-/// shallowest is merged first, so that the result does not depend on the order of the search.
+/// Selects the turns peak, valley, ..., peak (forces in fn_N) that remain when ripples are merged.
+/// A ripple is a peak and a neighbouring valley less than 5 % of the largest peak apart; the
+/// shallowest is merged first.
 std::vector<bool> without_ripples(const std::vector<double>& fn_N);
 
-/// The margin of a contact (theory.md): its least distance from another order of events.
+/// The margin of a contact: its smallest distance from another order of events (theory.md).
 class ContactMargin {
  public:
   struct Nearest {
@@ -76,10 +79,10 @@ class ContactMargin {
 
   /// An accepted step in one regime.
   void add_step(const ContactLaw& law, const TipState& start, const TipState& end, double h_s);
-  /// An event at the end of the last step; `before` is the law that held up to it.
+  /// An event at the end of the last step. `before` is the law before the event.
   void add_event(const ContactLaw& before, ContactEvent event, const TipState& tip);
 
-  /// The least distance so far, forces relative to `largest_fn_N`.
+  /// The smallest distance so far, with forces relative to `largest_fn_N`.
   Nearest nearest(double largest_fn_N) const;
 
  private:
@@ -94,14 +97,14 @@ class ContactMargin {
       }
     }
   };
-  /// A function of velocities over a step: the quadratic with these end values and this integral.
+  /// A function of velocities over a step: the quadratic with these end values and integral.
   struct Course {
     double first_m_s;
     double last_m_s;
     double path_m;
     double h_s;
 
-    /// Rates at the two ends, times h^2.
+    /// Rates at the start and the end, times h^2.
     double rise0() const { return 6.0 * path_m - h_s * (4.0 * first_m_s + 2.0 * last_m_s); }
     double rise1() const { return h_s * (2.0 * first_m_s + 4.0 * last_m_s) - 6.0 * path_m; }
     bool has_extremum() const { return rise0() * rise1() < 0.0; }
@@ -110,11 +113,11 @@ class ContactMargin {
     }
     double path_while_positive_m() const;
   };
-  /// A function of velocities that is negative in a regime; its zero is the event.
+  /// A function of velocities that is negative in a regime and zero at the event.
   struct Approach {
     bool is_near = true;   ///< at the end of the last step
     bool rises = false;    ///< at the end of the last step
-    double deepest = 0.0;  ///< its minimum
+    double deepest = 0.0;  ///< minimum of the function
   };
 
   void add_speed(double distance_m_s, std::string_view event);
@@ -124,16 +127,16 @@ class ContactMargin {
   double touch_speed_m_s_;
   Least speed_m_s_;
   Least force_N_;
-  double near_m_s_;  ///< functions of velocities below this cannot reduce speed_m_s_
+  double near_m_s_;  ///< a function of velocities below this cannot reduce speed_m_s_
   Approach turn_;
   Approach stick_;            ///< in slip
   double last_vn_m_s_ = 0.0;  ///< at the start of the last step
   double last_step_s_ = 1.0;
   bool has_turned_ = false;
-  bool stick_follows_slip_ = false;  ///< the present stick did not begin at touch
-  double back_m_s_ = 0.0;            ///< largest speed that P would have had against its last slip
+  bool stick_follows_slip_ = false;  ///< false if the present stick began at touch
+  double back_m_s_ = 0.0;            ///< maximum in stick of P's slip speed against its last slip
   double left_side_ = 0.0;           ///< limit of the cone that F_t leaves in the next step, or 0
-  std::optional<double> slip_began_m_;  ///< P at the start of the last slip after a stick
+  std::optional<double> slip_began_m_;  ///< position of P when the last slip began
 };
 
 inline void ContactMargin::add_step(const ContactLaw& law, const TipState& start,
@@ -161,22 +164,20 @@ inline void ContactMargin::add_step(const ContactLaw& law, const TipState& start
   }
 }
 
-/// Finds the largest magnitude of each reaction in a contact, from the parabola through the three
-/// values around it. Values are at instants, or means over spans w, which are corrected by w^2
+/// Finds the largest magnitude of each reaction in a contact by the parabola through three
+/// neighbouring values. Values are at instants, or means over spans w, which are corrected by w^2
 /// f''/24.
 class ReactionPeaks {
  public:
   explicit ReactionPeaks(std::size_t reactions) : reactions_(reactions) {}
 
-  /// The next span: its end, its length (0 for an instant), and the squared magnitudes of the means
-  /// over it, `stride` numbers apart. Spans come in order; one at the same time as the last (the
-  /// other side of an event) is ignored.
+  /// Adds the next span: its end, its length (0 for an instant) and the squared magnitudes of the
+  /// means, `stride` numbers apart. A second span at the same time, after an event, is ignored.
   void add(double end_s, double width_s, const double* squared_N2, std::size_t stride = 1) {
     const Span next{end_s - 0.5 * width_s, width_s};
-    if (has_last_ && !(next.middle_s > last_.middle_s)) {
+    if (!(next.middle_s > last_.middle_s)) {
       return;
     }
-    has_last_ = true;
     for (Reaction& reaction : reactions_) {
       const double next_N2 = *squared_N2;
       squared_N2 += stride;
@@ -192,28 +193,27 @@ class ReactionPeaks {
     last_ = next;
   }
 
-  /// A reaction that rises up to its last span is extrapolated to the end by a straight line; when
-  /// rises_at_end(), adding the value there first is more accurate.
+  /// A reaction that rises up to its last span is extrapolated linearly to its end. If
+  /// rises_at_end(), add the value at the end first, which is more accurate.
   std::vector<ReactionPeak> peaks() const;
   bool rises_at_end() const;
 
  private:
   struct Span {
-    double middle_s = 0.0;
+    double middle_s = -std::numeric_limits<double>::infinity();
     double width_s = 0.0;
   };
   struct Reaction {
-    double last_N2 = -1.0;  ///< below 0: none yet
+    double last_N2 = -1.0;  ///< negative before the first value
     double before_N2 = -1.0;
-    double threshold_N2 = 0.0;  ///< a lower maximum is not the largest
+    double threshold_N2 = 0.0;  ///< lower maxima cannot be the largest
     ReactionPeak largest{0.0, 0.0};
   };
   void add_maximum(Reaction& reaction, const Span& next, double next_N2) const;
 
   std::vector<Reaction> reactions_;
-  bool has_last_ = false;
-  Span before_;  ///< of the values before_N2
-  Span last_;    ///< of the values last_N2
+  Span before_;  ///< span of before_N2
+  Span last_;    ///< span of last_N2
 };
 
 }  // namespace oblique::solver

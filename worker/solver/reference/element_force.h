@@ -1,12 +1,12 @@
 #pragma once
 
-/// The elastic force of the beam element and its tangent: one source for numbers and packs of lanes
-/// (`Real`), with constants that are shared by all lanes or differ (`Constant`). Kernels are
-/// compiled once for each instruction set, so nothing here is shared with other translation units.
+/// The elastic force of the beam element and its tangent, for numbers and packs of lanes (`Real`)
+/// with shared or different constants (`Constant`). Kernels are compiled once for each instruction
+/// set, so nothing here is shared with other translation units.
 namespace oblique::solver {
 
-/// c + a b. Multiply-adds are named, since compilers would fuse different ones in each instance of
-/// a template. Packs have fused ones in lane_pack.h.
+/// c + a b. Multiply-adds are explicit, because compilers fuse different ones in each instance of a
+/// template. Packs have fused ones in fast/kernel_of.h.
 template <class C, class A, class B>
 inline auto plus_product(const C& c, const A& a, const B& b) {
   return c + a * b;
@@ -65,10 +65,10 @@ constexpr double legendre_p2(double zeta) {
   return 1.5 * zeta * zeta - 0.5;
 }
 
-/// Constants of the forces, tangent and mass of each element of a link.
+/// Constants of the force, tangent and mass of all elements of a link.
 template <class Constant>
 struct ElementConstants {
-  // Of elastic_forces().
+  // For elastic_forces().
   Constant two_inverse_length;
   Constant k00, k00_uu, k00_dd, k00_tt;
   Constant k01_ud, k01_dt;
@@ -114,7 +114,7 @@ inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
                                           const PlanarVector<Real>& p_j,
                                           const PlanarVector<Real>& s_j,
                                           const ElementConstants<Constant>& k) {
-  // By components, because compilers copy pairs through memory.
+  // x and y are separate, because compilers copy pairs through memory.
   using Vector = PlanarVector<Real>;
   const Vector u{p_j.x - p_i.x, p_j.y - p_i.y};
   const Vector d{s_j.x - s_i.x, s_j.y - s_i.y};
@@ -209,8 +209,7 @@ inline SymmetricPair<Real> with_trace(const SymmetricPair<Real>& G, const Real& 
 ///   G_ab = S/2 int P_a P_b r' r'T dzeta over [-1, 1],
 ///
 /// by five Gauss points, which are exact: the centre and two pairs +-zeta, where r' = even +- odd.
-/// Then in coordinates, by dc0 = (dp_j - dp_i)/l, dc1 = (ds_j - ds_i)/2, dc2 = (ds_i + ds_j)/2 -
-/// dc0.
+/// Coordinates follow by dc0 = (dp_j - dp_i)/l, dc1 = (ds_j - ds_i)/2, dc2 = (ds_i + ds_j)/2 - dc0.
 template <class Real, class Constant>
 inline TangentBlocks<Real> element_tangent(const PlanarVector<Real>& p_i,
                                            const PlanarVector<Real>& s_i,

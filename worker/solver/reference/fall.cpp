@@ -1,8 +1,6 @@
 #include "worker/solver/reference/fall.h"
 
 #include <algorithm>
-#include <cmath>
-#include <string>
 #include <utility>
 
 #include "worker/solver/model/errors.h"
@@ -11,10 +9,9 @@
 namespace oblique::solver {
 namespace {
 
-/// Most states kept. A state has 32 bytes a row; when there are more, every other one is dropped.
+/// When so many states are kept, every second one is dropped. A state has 32 bytes per row.
 constexpr std::size_t kMaxKept = 4096;
-/// More steps in sqrt(2 length/g) would take hours.
-constexpr double kMaxSteps = 1e9;
+constexpr double kMaxSteps = 1e9;  ///< in sqrt(2 length/g); more would take hours
 
 }  // namespace
 
@@ -43,7 +40,7 @@ SteppedFall::SteppedFall(std::shared_ptr<const Motion> motion, double dt_s, doub
 }
 
 bool SteppedFall::is_over_after_next(const TipState& tip) {
-  // Times are products, since sums would accumulate rounding.
+  // Times are products, because sums would accumulate rounding.
   const double t_s = time_s(++step_);
   if (!std::isfinite(tip.y_m) || std::abs(tip.y_m) > 2.0 * length_m_) {
     throw SolveError("the fall diverged at t = " + readable_number(t_s) +
@@ -129,7 +126,7 @@ ChainState SteppedFall::state_at_time(double t_s) const {
   }
   state.t_s = time_s(last_step);
   const double h_s = t_s - state.t_s;
-  // With shorter implicit steps, dividing by their square would amplify rounding.
+  // Shorter implicit steps would amplify rounding, because they divide by h^2.
   if (h_s > 1e-3 * dt_s_) {
     std::swap(before, state);
     motion_->step(before, kNoContact, h_s, state);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 #include <string>
 
 #include "worker/solver/model/errors.h"
@@ -19,10 +18,6 @@ Eigen::Vector2d contact_force(const AffineContactForce<double>& force, const Eig
 /// -dF_c/dr.
 Eigen::Matrix2d contact_stiffness(const AffineContactForce<double>& force) {
   return Eigen::Matrix2d{{force.k_tt, force.k_tn}, {0.0, force.k_nn}};
-}
-
-void solve(const ConstrainedChain::Matrix& factored, Coordinates& unknowns) {
-  factored.solve(std::span(unknowns.data(), static_cast<std::size_t>(unknowns.size())));
 }
 
 Eigen::RowVectorXd inverse_scale(const ConstrainedChain& chain, const ModelParameters& model) {
@@ -69,9 +64,9 @@ void GeneralizedAlphaMotion::restart(const AffineContactForce<double>& force,
   chain_.add_elastic_and_gravity(state.q, unknowns);
   unknowns.col(tip) -= contact_force(force, state.q.col(tip));
   unknowns = -unknowns;
-  solve(factored_matrix(force, 1.0, 0.0, state), unknowns);
+  factored_matrix(force, 1.0, 0.0, state).solve(unknowns.data());
   state.multipliers_N = chain_.take_multipliers(unknowns);
-  state.has_offset_rate = false;
+  state.algorithmic_offset_rate.resize(2, 0);
 }
 
 void GeneralizedAlphaMotion::find_offset_rate(const AffineContactForce<double>& force, double h_s,
@@ -83,9 +78,8 @@ void GeneralizedAlphaMotion::find_offset_rate(const AffineContactForce<double>& 
   rate.col(tip) += contact_stiffness(force) * state.v.col(tip);
   // a_n stands for q'' at t_n + (alpha_m - alpha_f) h.
   rate *= mass_factor() * (alpha_.alpha_f - alpha_.alpha_m);
-  solve(factored_matrix(force, mass_factor(), alpha_.beta * h_s * h_s, state), rate);
+  factored_matrix(force, mass_factor(), alpha_.beta * h_s * h_s, state).solve(rate.data());
   chain_.take_multipliers(rate);
-  state.has_offset_rate = true;
 }
 
 void GeneralizedAlphaMotion::predict(const ChainState& from,
@@ -93,7 +87,7 @@ void GeneralizedAlphaMotion::predict(const ChainState& from,
                                      ChainState& to) const {
   const auto& [alpha_m, alpha_f, beta, gamma] = alpha_;
   to = from;
-  if (!from.has_offset_rate) {
+  if (from.algorithmic_offset_rate.size() == 0) {
     find_offset_rate(force, h_s, to);
   }
   to.t_s = from.t_s + h_s;
@@ -120,7 +114,7 @@ double GeneralizedAlphaMotion::correct(const AffineContactForce<double>& force, 
   const double by_position = alpha_.beta * h_s * h_s;
   Coordinates correction;  // -(Delta a and Delta lambda)
   evaluate(force, h_s, state, correction);
-  solve(factored_matrix(force, mass_factor(), by_position, state), correction);
+  factored_matrix(force, mass_factor(), by_position, state).solve(correction.data());
   state.multipliers_N -= chain_.take_multipliers(correction);
   state.algorithmic_offset_rate -= correction;
   state.acceleration -= mass_factor() * correction;

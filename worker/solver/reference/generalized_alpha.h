@@ -34,9 +34,9 @@ struct GeneralizedAlphaParameters {
 /// [c M + beta h^2 K, Phi_qᵀ; Phi_q, 0], c = (1 - alpha_m)/(1 - alpha_f), is regular as h -> 0.
 class GeneralizedAlphaMotion : public Motion {
  public:
-  /// Newton stops when a correction moves no position by more than this fraction of an element's
-  /// length and no slope by more than this. Convergence is quadratic: the remaining error is about
-  /// the square. Steps in contact take one iteration.
+  /// Newton's method stops when a correction moves no position by more than this part of an
+  /// element's length and no slope by more than this. The remaining error is about the square.
+  /// Steps in contact take one iteration.
   static constexpr double kNewtonTolerance = 1e-6;
   static constexpr int kMaxIterations = 20;
 
@@ -63,36 +63,35 @@ class GeneralizedAlphaMotion : public Motion {
   }
 
  private:
-  /// (1 - alpha_m)/(1 - alpha_f), by which q'' follows a.
+  /// dq''/da of eq. 28.
   double mass_factor() const { return (1.0 - alpha_.alpha_m) / (1.0 - alpha_.alpha_f); }
-  /// The factors of [mass_factor M + stiffness_factor K, Phi_qᵀ; Phi_q, 0] at `state`.
+  /// Factors [mass_factor M + stiffness_factor K, Phi_qᵀ; Phi_q, 0] at `state`.
   ConstrainedChain::Matrix factored_matrix(const AffineContactForce<double>& force,
                                            double mass_factor, double stiffness_factor,
                                            const ChainState& state) const;
-  /// (a_0 - q''_0)/h of the first step after a restart: (alpha_m - alpha_f) q''' with
+  /// Sets (a_0 - q''_0)/h of the first step after a restart to (alpha_m - alpha_f) q''' with
   ///
   ///   (M + beta h^2/mass_factor K) q''' + Phi_qᵀ lambda' = -K v,   Phi_q q''' = 0.
   ///
-  /// The term in K changes it by order h^2 where the step resolves the motion. Elsewhere it keeps
-  /// the offset as small as the velocity allows, where -M^-1 K v would multiply rounding.
+  /// The term with h^2 is small where the step resolves the motion. For faster vibrations it keeps
+  /// rounding from being multiplied by M^-1 K.
   void find_offset_rate(const AffineContactForce<double>& force, double h_s,
                         ChainState& state) const;
-  /// Eqs. 26 to 28 as if q''_{n+1} were q''_n. a_{n+1} is stored in `algorithmic_offset_rate` until
-  /// the step is done.
+  /// Eqs. 26 to 28 with q''_{n+1} = q''_n. During a step `algorithmic_offset_rate` contains
+  /// a_{n+1}.
   void predict(const ChainState& from, const AffineContactForce<double>& force, double h_s,
                ChainState& to) const;
-  /// Eq. 15: M q'' + Phi_qᵀ lambda + dU/dq - Q - F_c and Phi/(beta h^2).
+  /// Eq. 15: sets `residual` to M q'' + Phi_qᵀ lambda + dU/dq - Q - F_c and Phi/(beta h^2).
   void evaluate(const AffineContactForce<double>& force, double h_s, const ChainState& state,
                 Coordinates& residual) const;
-  /// One correction of eqs. 26 to 28 by Newton's method. Returns how far it moves the chain, in the
-  /// norm of kNewtonTolerance.
+  /// One correction by Newton's method. Returns its size in the norm of kNewtonTolerance.
   double correct(const AffineContactForce<double>& force, double h_s, ChainState& state) const;
   ContactIntegrals<double> integrals(const AffineContactForce<double>& force, double h_s,
                                      const ChainState& from, const ChainState& to) const;
 
   ConstrainedChain chain_;
   GeneralizedAlphaParameters alpha_;
-  /// A row each: 1 over the shortest element's length for positions, 1 for slopes.
+  /// By row: 1 over the shortest element's length for positions, 1 for slopes.
   Eigen::RowVectorXd inverse_scale_;
 };
 

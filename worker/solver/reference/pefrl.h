@@ -19,7 +19,7 @@ struct Pefrl {
 
   static constexpr std::size_t kKicks = 4;
 
-  /// Largest stable omega h on a harmonic oscillator: there the trace of the step's map is -2.
+  /// Largest stable omega h for a harmonic oscillator, at which the trace of the step's map is -2.
   static constexpr double stability_limit() { return 2.9894495459063712; }
 };
 
@@ -30,10 +30,9 @@ struct UnwatchedStep {
 };
 
 /// Eqs. 13 and 15: steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next,
-/// which may be q and v themselves. `scratch` has the same size. `Real` is a number or a pack with
-/// one number per lane, as in chain_kernel.h. Calls `watch` for each row, from the tip to the row
-/// after the pin: with its rates at the start of the step, and later with those at its end. They
-/// are still in registers then, so that this costs little.
+/// which may be q and v themselves. `scratch` has the same size. Calls watch.start(row, v) and
+/// later watch.end(row, v) with the rates at both ends of the step, for each row from the tip to
+/// the row after the pin. The rates are in registers then, so calls cost little.
 template <class Constant, class Real, class Watch = UnwatchedStep<Real>>
 inline ContactIntegrals<Real> pefrl_step(const ChainTables<Constant>& chain,
                                          const AffineContactForce<Real>& force, const Real& h_s,
@@ -55,7 +54,7 @@ inline ContactIntegrals<Real> pefrl_step(const ChainTables<Constant>& chain,
     const Real kick_s = Pefrl::kick[stage] * h_s;
     const Real drift_s = Pefrl::drift[stage + 1] * h_s;
     const Real vt_before = v_from[tip];
-    // Kick, and drift on, as the accelerations come.
+    // Kicks and drifts each row as soon as its acceleration is known.
     const auto sweep = [&](const auto& tell) {
       substitute_accelerations(
           chain, scratch, [&](std::size_t row, const Real& ax, const Real& ay) {

@@ -14,10 +14,10 @@
 namespace oblique::solver {
 namespace {
 
-/// Maximum error of the energy balance, relative to the exchanged energy. With a larger one the
-/// step is too long to resolve the contact.
+/// Maximum error of the energy balance, relative to the exchanged energy. A larger error shows that
+/// the step does not resolve the contact.
 constexpr double kWorstClosure = 1e-2;
-/// Work below this fraction of the energies at touch drowns in their rounding.
+/// A smaller exchange, relative to the energies at touch, is lost in their rounding.
 constexpr double kLeastExchanged = 1e-10;
 
 void balance(const Energies& in, const Energies& out, const ContactRecord& record,
@@ -44,7 +44,7 @@ void balance(const Energies& in, const Energies& out, const ContactRecord& recor
   }
 }
 
-/// A row with the values that concern the chain; the others are zero.
+/// A row with the values of the chain. Values of the contact are zero.
 TraceRow chain_row(const Motion& motion, const AffineContactForce<double>& force,
                    const ChainState& state, bool with_shape) {
   const auto in_turn = [](const Eigen::Matrix2Xd& columns) {
@@ -73,7 +73,7 @@ TraceRow chain_row(const Motion& motion, const AffineContactForce<double>& force
 }
 
 TraceRow falling_row(const Motion& motion, ChainState& state, double touch_s, bool with_shape) {
-  motion.restart(kNoContact, state);  // reactions then do not depend on the last step
+  motion.restart(kNoContact, state);  // makes reactions independent of the last step
   TraceRow row = chain_row(motion, kNoContact, state, with_shape);
   row.t_s = state.t_s - touch_s;
   row.xP_m = row.x_m;

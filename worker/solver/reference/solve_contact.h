@@ -8,9 +8,9 @@
 
 namespace oblique::solver {
 
-/// Solves one contact by any integrator, from `touch` (a state of `motion`, the tip on the ground)
-/// to separation. The result lacks H, the fall time and the solver's name and version. Throws
-/// SolveError when there is no answer.
+/// Solves one contact by any integrator, from the state `touch` of `motion` to separation. The
+/// result lacks H, the fall time and the solver's name and version. Throws SolveError when there is
+/// no answer.
 CaseResult solve_contact(const Motion& motion, const ContactParameters& parameters,
                          const ContactSteps& steps, ChainState touch, const Tracing& tracing);
 
@@ -20,12 +20,12 @@ CaseResult solve_contact(const Motion& motion, const ContactParameters& paramete
 CaseResult contact_result(const Contact& contact, const TipState& touch, const Energies& in,
                           const Energies& out);
 
-/// Gives the row of an accepted instant to tracing.sink, which must be set.
+/// Passes the row of an accepted instant to tracing.sink, which must be set.
 void trace_instant(const Motion& motion, const Tracing& tracing, const TipState& touch,
                    const Contact& contact, const ChainState& state);
 
-/// Gives kFallRows instants of the fall to tracing.sink, from release to the touch at drop H_m.
-/// Times are exact to a thousandth of a step. Throws what Fall::state_at throws.
+/// Passes kFallRows instants of the fall to tracing.sink, from release to the touch at drop H_m.
+/// Times are exact to a thousandth of a step. Throws exceptions of Fall::state_at.
 void trace_fall(const Motion& motion, const Fall& fall, double H_m, const Tracing& tracing);
 
 }  // namespace oblique::solver

@@ -1,7 +1,7 @@
 #pragma once
 
-/// The interface between the motion of a chain and the contact at its tip: the contact gives a
-/// force, the motion returns the tip's state and the integrals of the force.
+/// The interface between the motion of a chain and the contact at its tip. The contact sets the
+/// force; the motion returns the tip's state and the integrals of the force.
 namespace oblique::solver {
 
 /// Tip position and velocity in the fixed frame, origin at O, y up.

@@ -236,7 +236,7 @@ TEST(SolvedWithErrors, EstimatesEqualThoseOfThePointSolvedAlone) {
 }
 
 TEST(SolvedWithErrors, IfTheCompanionFailsThePointIsSolvedWithoutErrors) {
-  FallCache falls({}, [](auto models) {
+  FallCache falls(std::size_t{1} << 20, [](auto models) {
     return std::vector<FallOutcome>(models.size(), FallOutcome{nullptr, "no fall today"});
   });
   const Outcomes outcomes = solved_with_errors({mixed_points().front()}, falls);

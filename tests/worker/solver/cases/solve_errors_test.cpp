@@ -111,9 +111,8 @@ TEST(SolveErrors, OverflowIsAnErrorInBoundedTime) {
 TEST(SolveErrors, StepsTooShortToFinishAContactFailAtOnce) {
   EXPECT_THAT(solve_error([](ModelParameters& m) { m.dt_s = 1e-300; }),
               AllOf(HasSubstr("steps of 1e-300 s"), HasSubstr("a longer dt")));
-  EXPECT_THAT(
-      solve_error([](ModelParameters& m) { m.dt_s = 1e-14; }),
-      AllOf(HasSubstr("more than 5000000 steps of 1e-14 s"), HasSubstr("dt must be longer")));
+  EXPECT_THAT(solve_error([](ModelParameters& m) { m.dt_s = 1e-14; }),
+              AllOf(HasSubstr("steps of 1e-14 s"), HasSubstr("a longer dt")));
   EXPECT_THAT(solve_error([](ModelParameters& m) { m.k_N_m = 1e30; }), HasSubstr("k = 1e+30 N/m"));
   EXPECT_THAT(solve_error([](ModelParameters& m) {
                 m.integrator = Integrator::kGeneralizedAlpha;

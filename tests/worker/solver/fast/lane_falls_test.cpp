@@ -8,7 +8,6 @@
 #include <deque>
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -220,13 +219,6 @@ TEST(CollocationFall, HasTheSameBitsAloneAndBesideOthers) {
     requests.push_back(request_for(chain));
   }
   expect_same_bits_alone_and_beside_others(requests, solve_by_collocation);
-}
-
-TEST(CollocationFall, RefusesChainsOfDifferentShapes) {
-  const Chain chain(model_of(1));
-  const Chain longer(model_of(2));
-  const std::vector<FallRequest> requests{request_for(chain), request_for(longer)};
-  EXPECT_THROW(solve_by_collocation(requests), std::invalid_argument);
 }
 
 TEST(CollocationFall, InstructionSetsDifferByRoundingOnly) {

@@ -72,19 +72,15 @@ TEST(BandedCholesky, DetectsAMatrixThatIsNotPositiveDefinite) {
   }
 }
 
-TEST(BandedMatrix, BilinearFormUsesEveryOtherEntryOfInterleavedVectors) {
+TEST(BandedMatrix, QuadraticFormUsesEveryOtherEntryOfAnInterleavedVector) {
   std::mt19937_64 generator(3);
   const Sample sample = random_matrix(9, 0.0, generator);
-  const Eigen::VectorXd left = Eigen::VectorXd::Random(9);
-  const Eigen::VectorXd right = Eigen::VectorXd::Random(9);
-  std::vector<double> interleaved_left(18, 7.0);
-  std::vector<double> interleaved_right(18, 7.0);
+  const Eigen::VectorXd x = Eigen::VectorXd::Random(9);
+  std::vector<double> interleaved(18, 7.0);
   for (Eigen::Index i = 0; i < 9; ++i) {
-    interleaved_left[static_cast<std::size_t>(2 * i)] = left[i];
-    interleaved_right[static_cast<std::size_t>(2 * i)] = right[i];
+    interleaved[static_cast<std::size_t>(2 * i)] = x[i];
   }
-  EXPECT_NEAR(sample.banded.bilinear(interleaved_left.data(), interleaved_right.data(), 2),
-              left.dot(sample.dense * right), 1e-14);
+  EXPECT_NEAR(sample.banded.quadratic_form(interleaved.data()), x.dot(sample.dense * x), 1e-14);
 }
 
 constexpr std::size_t kBandwidth = 3;
@@ -111,7 +107,7 @@ TEST(BandedLu, SolvesAsADenseFactorisationDoesEvenWithZerosOnTheDiagonal) {
     }
     const Eigen::VectorXd right = Eigen::Map<Eigen::VectorXd>(x.data(), n);
     ASSERT_TRUE(banded.factor());
-    banded.solve(x);
+    banded.solve(x.data());
     const Eigen::VectorXd solution = Eigen::Map<Eigen::VectorXd>(x.data(), n);
     EXPECT_LT((dense * solution - right).norm(), 1e-12 * (dense.norm() * solution.norm()));
     const Eigen::VectorXd expected = dense.partialPivLu().solve(right);
@@ -135,8 +131,8 @@ TEST(BandedLu, AddingABlockEqualsAddingItsEntries) {
   ASSERT_TRUE(by_entries.factor());
   std::vector<double> x{1.0, 2.0, 3.0};
   std::vector<double> y = x;
-  by_block.solve(x);
-  by_entries.solve(y);
+  by_block.solve(x.data());
+  by_entries.solve(y.data());
   EXPECT_EQ(x, y);
 }
 

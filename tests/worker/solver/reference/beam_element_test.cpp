@@ -41,12 +41,8 @@ Nodes straight_nodes(double angle_rad, double x_m, double y_m) {
   return q;
 }
 
-GradientCoefficients gradient(const Nodes& q) {
-  return gradient_coefficients(q.transpose(), 1.0 / kLength_m);
-}
-
 double energy(const Nodes& q) {
-  return strain_energy(gradient(q), constants());
+  return strain_energy(q.transpose(), constants());
 }
 
 Nodes energy_gradient(const Nodes& q) {
