@@ -275,8 +275,10 @@ struct QueryPool::Running {
 
   std::uint64_t ticket;
   std::int64_t time_limit_ms;
-  std::int64_t deadline_ms = 0;       ///< for the next chunk, or until the client receives one
-  std::int64_t answer_ends_ms = 0;    ///< deadline for the whole answer
+  // deadline for the process to send a chunk or, if the client must first receive one, for the
+  // client
+  std::int64_t deadline_ms = 0;
+  / std::int64_t answer_ends_ms = 0;  ///< deadline for the whole answer
   std::uint64_t given = 0;            ///< number of reported chunks
   std::uint64_t received_chunks = 0;  ///< number of chunks that the client has received
   pid_t pid = -1;
@@ -405,8 +407,8 @@ bool QueryPool::start_next() {
   return true;
 }
 
-/// Reports received frames, up to kChunksAhead more than the client has received. Returns false if
-/// the query has ended.
+/// Reports frames that the process has sent, at most kChunksAhead more than the client has
+/// received. Returns false if the query has ended.
 bool QueryPool::goes_on(Running& query) {
   while (!query.waits_for_client()) {
     auto frame = query.next_frame();

@@ -17,12 +17,12 @@ namespace oblique::server {
 
 /// The size of a batch that a worker wants.
 struct BatchSize {
-  std::uint64_t points;      ///< target number; a batch ends with a group near it
+  std::uint64_t points;      ///< target number of points; a batch ends with a group near it
   std::uint64_t groups = 1;  ///< minimum number of groups, if they fit into `most_points`
   /// maximum number of points if that completes groups; 0: same as `points`
   std::uint64_t most_points = 0;
-  /// Number of falls that the worker solves side by side, which becomes the size of groups if the
-  /// study is arranged now. 0 if it must not be arranged, because leases refer to places.
+  /// Number of falls that the worker solves side by side. If the study is arranged now, its groups
+  /// get this size. 0: the study must not be arranged, because leases refer to places.
   std::uint64_t falls = 0;
   /// The place at which the worker's last batch ended. The rest of that batch's last group comes
   /// first, because the worker has already solved its falls.
@@ -59,7 +59,7 @@ struct Batch {
 class StudyPoints {
  public:
   /// `completed` contains the completed points, among them `left_out` points that a filter leaves
-  /// out. Does not make the table of a complete study.
+  /// out. If the study is complete, does not make the table.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 
@@ -83,7 +83,7 @@ class StudyPoints {
     std::uint32_t attempts;
     std::uint32_t alone;  ///< number of workers that were lost while they held only this point
   };
-  /// Returns the points that have been failing since `until_ms`, and moves them to committing.
+  /// Returns the points that began to fail at `until_ms` or earlier, and moves them to committing.
   std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
   /// Returns the leased points at the places `parts` to the sets of returned points, with the given
