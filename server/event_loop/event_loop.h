@@ -115,9 +115,8 @@ struct LoopSettings {
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once when the loop ends.
   std::function<void(const LoopState&)> on_turn = [](const LoopState&) {};
-  // The caller must set `solver_version`. EventLoop sets the numbers that come from the database.
+  /// The caller must set `solver_version`. EventLoop sets the numbers that come from the database.
   ServiceSettings service;
-  /
 };
 
 /// Outcome of a run of the loop.

@@ -275,10 +275,10 @@ struct QueryPool::Running {
 
   std::uint64_t ticket;
   std::int64_t time_limit_ms;
-  // deadline for the process to send a chunk or, if the client must first receive one, for the
-  // client
+  /// deadline for the next chunk from the process or, while the query waits for the client, for the
+  /// client to receive one
   std::int64_t deadline_ms = 0;
-  / std::int64_t answer_ends_ms = 0;  ///< deadline for the whole answer
+  std::int64_t answer_ends_ms = 0;    ///< deadline for the whole answer
   std::uint64_t given = 0;            ///< number of reported chunks
   std::uint64_t received_chunks = 0;  ///< number of chunks that the client has received
   pid_t pid = -1;

@@ -29,14 +29,13 @@ struct QueryJob {
 
 struct QueueSettings {
   std::size_t readers = limits::kRunningQueries;  ///< maximum number of running queries
-  // maximum number of running queries per client
+  /// maximum number of running queries per client
   std::size_t most_running_each = limits::kRunningQueriesOfClient;
-  / std::size_t most_waiting = limits::kWaitingQueries;  ///< maximum number of waiting queries
-  // maximum number of waiting queries per client
+  std::size_t most_waiting = limits::kWaitingQueries;  ///< maximum number of waiting queries
+  /// maximum number of waiting queries per client
   std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;
-  /
-      /// maximum total size of waiting statements [bytes]
-      std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;
+  /// maximum total size of waiting statements [bytes]
+  std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;
 };
 
 /// Chooses the next query: round-robin over clients, in order of arrival within one client.

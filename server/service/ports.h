@@ -86,8 +86,8 @@ class Ports {
 
 protocol::ClientReply error_reply(const std::string& message);
 
-/// Writes log lines that peers can cause at any rate: at most 20 in 10 s, then the number of
-/// others.
+/// Writes log lines that peers can cause at any rate: at most 20 lines in 10 s, then the number of
+/// suppressed lines.
 class PeerLog {
  public:
   explicit PeerLog(Ports& ports) : ports_(ports) {}

@@ -48,13 +48,14 @@ class StudyChanges {
   /// Handles a submission with a valid recipe.
   void submit(const Client& client, const ReadRequest& read, Instant now);
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
-  /// Sets a study to done, because all its points are completed. While it grows, only records this.
+  /// Sets a study to done, because all its points are completed. While points are being added, only
+  /// records that the earlier points are completed.
   void finish(StudyId id, Instant now);
   /// Sends pending replies to submissions if the lookup of reusable results has ended or takes
   /// long, or the study is gone.
   void release_replies(Instant now);
 
-  /// A lookup ends early after this number of probes, or after this time, without a result.
+  /// A lookup ends early if this number of probes, or this time, gives no result.
   static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
   /// Looks up results of other studies for all open points, in parts. The scheduler must hold the
@@ -64,7 +65,7 @@ class StudyChanges {
   void stop_lookups() { lookups_stop_ = true; }
 
  private:
-  /// A change of a study that is being written.
+  /// A change that is being written, and the requests that wait for it.
   struct Pending {
     bool grows = false;        ///< true if it adds points
     bool is_complete = false;  ///< true if all earlier points have been completed

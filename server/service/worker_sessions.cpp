@@ -120,7 +120,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       break;
     }
     case Kind::kTrace:
-      input.events.emplace_back(CreditGiven{worker, 0});  // counts as a sign of life
+      input.events.emplace_back(CreditGiven{worker, 0});  // a sign of life of the worker
       input.trace_of = worker;
       input.trace = std::move(*message.mutable_trace());
       break;

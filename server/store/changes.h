@@ -177,7 +177,7 @@ inline bool needs_full_sync(const Change& change) {
 enum class ClearedAway {
   kAll,   ///< no rows of deleted studies are left
   kPart,  ///< more rows may be left
-  /// no row was deleted, because readers keep the write-ahead log long; try again later
+  /// no row was deleted, because readers keep the write-ahead log from shrinking; try again later
   kMustWait,
 };
 

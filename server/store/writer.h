@@ -22,7 +22,7 @@ namespace oblique::server {
 /// Counts observed values in bins. Not thread-safe.
 class Histogram {
  public:
-  /// `bounds` must ascend. Each is the largest value of its bin. Larger values have one more bin.
+  /// `bounds` must ascend. Each is the largest value of its bin. One more bin counts larger values.
   explicit Histogram(std::vector<double> bounds)
       : bounds_(std::move(bounds)), counts_(bounds_.size() + 1) {}
 
@@ -121,7 +121,7 @@ class GroupCommit {
   bool gone_ = false;
   bool clears_ = false;        // true if rows of deleted studies may be left
   bool to_be_merged_ = false;  // true if a study is done, so that the log should be merged
-  int tries_ = 0;              // number of failed attempts to merge since then
+  int tries_ = 0;              // number of failed attempts to merge since the study was done
   std::string why_unmerged_;
 };
 

@@ -184,7 +184,7 @@ void HttpServer::set_due(MHD_Connection* connection, Time due) {
 }
 
 /// Suspends a connection until the next wake. `wakes` is the number of wakes before the answer was
-/// polled; if another one has followed, does not suspend.
+/// polled. Does not suspend if there was another wake since then.
 void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
   const std::lock_guard lock(mutex_);
   MHD_suspend_connection(connection);
