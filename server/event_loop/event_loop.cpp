@@ -19,9 +19,9 @@ namespace {
 constexpr std::chrono::milliseconds kTick{100};
 /// Maximum time for sending the remaining output when the server ends.
 constexpr std::chrono::milliseconds kLinger{500};
-/// Maximum time for the messages of one port in one turn of the loop.
+/// Maximum time for the messages of one port in each turn of the loop.
 constexpr std::chrono::milliseconds kShareOfTurn{5};
-/// After the loss of the database, requests are answered with the reason for this time.
+/// Time after the loss of the database in which the server still answers requests, with an error.
 constexpr std::chrono::seconds kFarewell{3};
 /// Maximum time for reading messages that have already arrived when the server ends.
 constexpr std::chrono::milliseconds kLongestLastRead{1000};

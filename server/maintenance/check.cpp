@@ -233,7 +233,7 @@ std::string row_fault_sql() {
 
 Diagnosis diagnose_contents(sqlite3* database) {
   Diagnosis found;
-  // The definition of a changed table could contain endless computations, so its rows are not read.
+  // A changed table may be defined with endless computations, so its rows are not read.
   for (const std::string& table : differing_tables(database)) {
     found.faults.push_back(fmt::format(
         "the table {} is missing or has other columns, so no server can use this file: `oblique "

@@ -404,7 +404,7 @@ void Network::serve(Number number, std::uint32_t events) {
   }
 }
 
-/// Runs a few pending steps. The limit lets connected peers be served in between.
+/// Runs at most kStepsATurn pending steps, so that connected peers are served in between.
 void Network::run_handshakes() {
   for (std::size_t steps = 0; steps < kStepsATurn && !pending_steps_.empty();) {
     const Number number = pending_steps_.front();

@@ -128,7 +128,7 @@ class Network {
     std::unique_ptr<PortSecurity> security;
     std::size_t connections = 0;
     std::deque<Number> queue{};     // peers with a message, in order of their turns
-    std::size_t held_in_bytes = 0;  // total size of its peers' messages
+    std::size_t held_in_bytes = 0;  // total size of the messages of this port's peers
     std::vector<Number> paused{};   // peers that are not read while the port is full
     bool is_accepting = true;       // if false, new connections wait in the kernel
   };

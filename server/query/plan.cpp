@@ -472,7 +472,7 @@ std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
 }
 
 /// Returns the indices of an axis's first and last value in `interval`; none if no value is in it.
-/// For a range the result is one value wider at each end.
+/// If the axis is a range, the result is one value wider at each end.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
   if (axis.count() > 0) {
     if (interval.low > interval.high) {
@@ -719,7 +719,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   auto& [select, where, group, order] = parts;
   const auto tokens = sql_tokens(select.written);
   for (const Part& part : parts) {
-    // In ORDER BY, SQL takes a name for an alias first, so aliases are allowed there.
+    // In ORDER BY, SQL looks a name up among the aliases first. So aliases are allowed there.
     check_letter_case(part, &part == &order ? aliases_of(tokens) : Names());
   }
   check_grouped(select, group);

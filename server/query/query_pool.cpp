@@ -35,7 +35,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
-/// Value for a cancelled query, in place of its number of received chunks.
+/// For a cancelled query, this value replaces the number of received chunks.
 constexpr std::uint64_t kCancelled = UINT64_MAX;
 
 // ---- The reader process -------------------------------------------------------------------------
@@ -68,8 +68,8 @@ void confine() {
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);
   sqlite3_hard_heap_limit64(kHeapBytes);
-  // Errors of the next two calls are ignored, because the reader can run without them. The second
-  // one makes the kernel kill this process first when memory runs out.
+  // Errors of the next two calls are ignored, because the reader can run without them. With the
+  // second one the kernel kills this process first when memory runs out.
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
   std::ofstream("/proc/self/oom_score_adj") << "1000";
 }

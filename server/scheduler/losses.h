@@ -123,8 +123,8 @@ class WorkerProcesses {
   std::size_t most_absent_;
   ProcessNumber last_number_ = kNoProcess;
   std::map<ProcessNumber, WorkerProcess> processes_;
-  std::map<std::string, ProcessNumber> numbers_;  // number by ID of the process
-  std::deque<ProcessNumber> absent_;              // in the order in which they became absent
+  std::map<std::string, ProcessNumber> numbers_;  // process numbers, by ID of the process
+  std::deque<ProcessNumber> absent_;              // absent processes, the longest absent first
 };
 
 }  // namespace oblique::server

@@ -176,7 +176,7 @@ IntervalSet PointOrder::places(const IntervalSet& points) const {
       at += count;
     }
   });
-  std::ranges::sort(parts, {}, &Interval::begin);  // then each insertion below is at the end
+  std::ranges::sort(parts, {}, &Interval::begin);  // so that each insertion below is at the end
   IntervalSet places;
   places.insert(parts);
   return places;

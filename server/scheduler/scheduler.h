@@ -56,8 +56,8 @@ struct WorkerCounts {
   std::uint64_t leased_points;
   std::uint64_t solved_points;
   std::int64_t silent_ms;
-  std::uint64_t losses;  ///< number of its process's leases that ended without an answer
-  bool is_proven;        ///< true if its process has solved leased points
+  std::uint64_t losses;  ///< number of leases of the worker's process that ended without an answer
+  bool is_proven;        ///< true if the worker's process has solved leased points
   bool is_set_aside;
   WorkerState state;
 };
@@ -157,7 +157,7 @@ class Scheduler {
     std::int32_t priority = 0;
     /// Number of batches leased since the study was last open. A long batch counts for several.
     double served = 0.0;
-    std::string solver_version{};  ///< version that made its results and leases; empty without both
+    std::string solver_version{};  ///< solver version of its results and leases; empty without both
     std::set<LeaseId> leases{};
     bool held = false;
     std::optional<Rank> rank{};  ///< the study's entry in `free_`
@@ -170,7 +170,7 @@ class Scheduler {
     WorkerId worker;
     StudyId study;
     Batch batch;
-    bool alone;  ///< true if it has suspect points; its worker then gets no other lease
+    bool alone;  ///< true if the points are suspect; the worker then gets no other lease
     std::int64_t granted_ms;
     LeaseId twin = 0;  ///< another worker's lease for the rest of this batch; 0: none
   };
@@ -178,11 +178,12 @@ class Scheduler {
   struct Pace {
     double busy_s = 0.0;  ///< thread time for `points`; recent messages have more weight
     double points = 0.0;
-    /// Thread time and number of solved points, from messages with solved points only.
+    /// Like `busy_s` and `points`, but for solved points only. Messages without solved points do
+    /// not count.
     double solved_busy_s = 0.0;
     double solved = 0.0;
     std::uint64_t last_batch_points = 0;  ///< size of its last batch, or the wanted size if larger
-    std::uint64_t last_end = 0;           ///< place at which its last batch ended; 0: no batch yet
+    std::uint64_t last_end = 0;           ///< place at which the last batch ended; 0: no batch yet
     std::uint64_t held_points = 0;        ///< number of points in its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown

@@ -55,8 +55,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     serve_suspect(id, worker, suspect_study);
     return true;
   } else if (draining_ == id || draining_ == 0) {
-    // Suspect points need a worker without leases. Only this worker waits for that; others
-    // continue.
+    // Suspect points need a worker without leases. Only this worker waits until it has none; other
+    // workers continue.
     draining_ = id;
     return false;
   }
@@ -241,7 +241,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   Study& served = studies_.at(study);
   Pace& pace = worker.paces[study];
   const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
-  // Limits the duration that counts, because a worker may report any pace.
+  // Limits the duration that counts for the study, because a worker may report a wrong pace.
   const double counted_s = std::clamp(takes_s, settings_.batch_target_s,
                                       settings_.lanes_batch_s + settings_.batch_target_s);
   served.served += counted_s / settings_.batch_target_s;

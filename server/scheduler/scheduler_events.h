@@ -84,7 +84,7 @@ struct StudyAdded {
   bool cancelled = false;
   bool paused = false;
   std::int32_t priority = 0;
-  std::string solver_version{};  ///< version that made its results; empty without results
+  std::string solver_version{};  ///< solver version of its results; empty without results
   bool held = false;
   std::uint64_t left_out = 0;  ///< number of completed points that a filter leaves out
 };

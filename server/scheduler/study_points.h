@@ -94,11 +94,12 @@ class StudyPoints {
   /// Removes the losses of this process from the histories of all returned points.
   void take_back_losses(ProcessNumber process);
 
-  /// Moves a point whose result was received to committing. Returns false if it was received before
-  /// or is not in the study.
+  /// Moves a point to committing, because its result was received. Returns false if a result was
+  /// received before or the point is not in the study.
   bool receive(std::uint64_t point);
 
-  /// Moves received left-out points to committing. Returns the moved points.
+  /// Moves left-out points to committing, because a worker has reported them. Returns the moved
+  /// points.
   IntervalSet receive(const IntervalSet& left_out);
 
   /// Completes a point whose result is durable. Returns false if the point was not committing.
@@ -122,7 +123,8 @@ class StudyPoints {
   bool may_leave_out(const IntervalSet& points) const;
   /// Returns whether any returned points have this level of suspicion.
   bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
-  /// Returns when the next points of this level were returned. There must be such points.
+  /// Returns the time at which the first points of this level, by place, were returned. There must
+  /// be such points.
   std::int64_t returned_ms(Suspicion suspicion) const {
     return returned(suspicion).begin()->second.returned_ms;
   }

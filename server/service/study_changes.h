@@ -18,11 +18,11 @@ namespace oblique::server {
 /// A parsed request of a client and, for a submission, the table of its recipe.
 struct ReadRequest {
   bool is_readable = false;             ///< if false, only the request number is valid
-  std::uint64_t request_id = 0;         ///< 0 if it cannot be read
-  protocol::ClientRequest request;      ///< has no recipe, because that is in `table`
+  std::uint64_t request_id = 0;         ///< 0 if the number cannot be read
+  protocol::ClientRequest request;      ///< without the recipe, which is in `table`
   StudyTable table;                     ///< set if the recipe is valid
   std::string recipe_error;             ///< why the recipe is invalid; empty if it is valid
-  bool needs_point_validation = false;  ///< true if its points must still be validated
+  bool needs_point_validation = false;  ///< true if the points must still be validated
 };
 
 /// Parses one frame, in time and memory proportional to its size: a long frame that is padded with
@@ -67,7 +67,7 @@ class StudyChanges {
  private:
   /// A change that is being written, and the requests that wait for it.
   struct Pending {
-    bool grows = false;        ///< true if it adds points
+    bool grows = false;        ///< true if the change adds points
     bool is_complete = false;  ///< true if all earlier points have been completed
     std::vector<std::function<void(Instant)>> deferred{};  ///< later requests for the study
   };

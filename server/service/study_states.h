@@ -44,7 +44,7 @@ struct StudyRecord {
   std::string created_at;
   std::int32_t priority = 0;
   IntervalSet failures{};      ///< points whose row has an error
-  std::int64_t since_ms{};     ///< start of the time over which its rate is computed
+  std::int64_t since_ms{};     ///< start of the period over which the rate is computed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
   Reuse reuse{};
   StudyState state = StudyState::kRunning;

@@ -139,7 +139,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
 void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHello& hello,
                            Instant now, const std::string& key, WorkerInput& input) {
   if (ledger_.is_gone() || !ledger_.has_room()) {
-    return;  // the worker will send it again
+    return;  // the worker will send the message again
   }
   if (const auto known = ids_.find(identity); known != ids_.end()) {
     const WorkerId old = known->second;

@@ -28,12 +28,12 @@ struct WorkerSessionSettings {
 struct WorkerRecord {
   std::string identity;
   AddWorker row;                  ///< the worker's row, stored with its first result
-  std::string key;                ///< name of its key; empty without keys
-  std::string host;               ///< name of its machine
-  std::int64_t last_sent_ms = 0;  ///< time of the last message to it, rounded up to a tick
+  std::string key;                ///< name of the worker's key; empty without keys
+  std::string host;               ///< name of the worker's machine
+  std::int64_t last_sent_ms = 0;  ///< time of the last message to the worker, rounded up to a tick
   bool was_sent = false;          ///< true if a message was sent since the last tick
   bool is_busy = false;           ///< value of the last WorkerBusy event
-  bool has_row = false;           ///< true if the database has a row for it
+  bool has_row = false;           ///< true if the database has a row for the worker
 };
 
 /// The content of a worker's frame.

@@ -99,11 +99,12 @@ class GroupCommit {
   /// Deletes at most `most` rows of deleted studies. Returns false if the next call should wait.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
-  /// Checks the file of the database, and merges its log after a study is done. Must be called
+  /// Checks the file of the database. Merges the log after a study is done. Must be called
   /// regularly while no job waits.
   std::vector<WriteReport> maintain();
 
-  /// Merges the log. Returns false if that failed; then check `is_gone` before another attempt.
+  /// Merges the log. Returns false if that failed; the caller must then check `is_gone` before
+  /// another attempt.
   bool merge(std::vector<WriteReport>& reports);
   /// Returns the report of a failed `merge`.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }

@@ -20,7 +20,7 @@ inline constexpr std::size_t kWaitingOutBytes = 64 * kMiB;
 inline constexpr std::size_t kUnstoredBytes = 64 * kMiB;
 /// Maximum number of running queries. Each uses a process and up to 256 MiB.
 inline constexpr std::size_t kRunningQueries = 4;
-/// Maximum number of points of all open studies; above it sums could overflow. Memory depends on
+/// Maximum number of points of all open studies. Above it sums could overflow. Memory depends on
 /// the number of intervals, not of points.
 inline constexpr std::uint64_t kOpenPoints = 10'000'000'000'000;
 /// Maximum number of batches that a worker may request at a time. If one worker held more, other
@@ -31,7 +31,7 @@ inline constexpr std::uint32_t kCredit = 1024;
 
 /// Maximum total size of messages from peers that are incomplete or not taken yet.
 inline constexpr std::size_t kHeldInBytes = 512 * kMiB;
-/// Maximum size of these messages at one port. Above it the peers of the port are not read.
+/// Maximum size of such messages at one port. Above it the peers of the port are not read.
 inline constexpr std::size_t kHeldInToPauseBytes = 64 * kMiB;
 /// A peer with more unsent output than this is busy: it gets no batch, and its requests are not
 /// read.
@@ -59,8 +59,8 @@ inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
 /// Maximum number and total size of long requests that wait for the check thread.
 inline constexpr std::size_t kWaitingChecks = 64;
 inline constexpr std::size_t kWaitingCheckBytes = 64 * kMiB;
-/// Maximum number of studies or workers in a reply, and its approximate maximum size. Such a reply
-/// takes the service's thread only some milliseconds.
+/// Maximum number of studies or workers in a reply, and the approximate maximum size of the reply.
+/// Such a reply takes the service's thread only some milliseconds.
 inline constexpr std::uint32_t kListed = 1000;
 inline constexpr std::size_t kListedBytes = kMiB;
 /// Maximum number of studies that are neither done nor cancelled. Each needs some kilobytes.

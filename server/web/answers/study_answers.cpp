@@ -302,7 +302,7 @@ class Flow {
   ServiceExchange exchange_;
   ServedStudy study_;
   std::uint64_t points_ = 0;          // number of points in the study
-  std::shared_ptr<const void> slot_;  // held while the recipe is being requested
+  std::shared_ptr<const void> slot_;  // permission to request the recipe
   bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;
