@@ -130,7 +130,7 @@ class StudyCheck {
   /// (proto/recipe/point_table.h), because another machine computed the values. Fast for rows in
   /// the order of their points.
   std::string recipe_fault(const protocol::PointTable& table) {
-    if (rows_.number(0) >= table.size()) {  // also true for a negative number, as unsigned
+    if (rows_.number(0) >= table.size()) {  // as unsigned, negative numbers are too large
       return "the study has no such point";
     }
     const protocol::Point point = table.point(rows_.number(0));

@@ -25,7 +25,7 @@ namespace oblique::server {
 /// Limits on memory and connections that peers can use. proto/protocol.md lists them.
 struct NetworkLimits {
   std::size_t connections =
-      limits::kConnections;  ///< maximum for all ports together; the system may allow fewer
+      limits::kConnections;  ///< maximum number at all ports; the system may allow fewer
   /// Maximum total size of messages that are incomplete or not taken. A peer has at most one
   /// message.
   std::size_t held_in_bytes = limits::kHeldInBytes;

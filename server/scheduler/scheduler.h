@@ -182,7 +182,7 @@ class Scheduler {
     /// not count.
     double solved_busy_s = 0.0;
     double solved = 0.0;
-    std::uint64_t last_batch_points = 0;  ///< size of its last batch, or the wanted size if larger
+    std::uint64_t last_batch_points = 0;  ///< size of the last batch, or the wanted size if larger
     std::uint64_t last_end = 0;           ///< place at which the last batch ended; 0: no batch yet
     std::uint64_t held_points = 0;        ///< number of points in its leases
 
@@ -192,7 +192,7 @@ class Scheduler {
   struct Worker {
     std::uint32_t threads;
     std::uint32_t credit = 0;
-    bool is_busy = false;  ///< true if it does not read its messages and so gets no batch
+    bool is_busy = false;  ///< the worker does not read its messages, so it gets no batch
     ProcessNumber process = kNoProcess;
     LeaseId probe = 0;                        ///< lease of its probe; 0: it has no probe
     std::optional<std::int64_t> probed_ms{};  ///< time at which it got its last probe
@@ -201,7 +201,7 @@ class Scheduler {
     std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    std::map<StudyId, std::uint64_t> defined;  ///< number of points in each recipe that it has
+    std::map<StudyId, std::uint64_t> defined;  ///< points in each recipe that the worker has
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;

@@ -31,7 +31,8 @@ inline constexpr std::uint32_t kCredit = 1024;
 
 /// Maximum total size of messages from peers that are incomplete or not taken yet.
 inline constexpr std::size_t kHeldInBytes = 512 * kMiB;
-/// Maximum size of such messages at one port. Above it the peers of the port are not read.
+/// Maximum size of incomplete and waiting messages at one port. Above it the peers of the port are
+/// not read.
 inline constexpr std::size_t kHeldInToPauseBytes = 64 * kMiB;
 /// A peer with more unsent output than this is busy: it gets no batch, and its requests are not
 /// read.
