@@ -40,7 +40,8 @@ struct flock servers_lock() {
   return lock;
 }
 
-/// Formats the path as a URI for SQLite, and escapes the letters that have a meaning there.
+/// Formats the path as a URI for SQLite. Escapes the characters that have a special meaning in a
+/// URI.
 std::string as_uri(const std::string& path) {
   std::string uri = "file:";
   for (const char letter : fs::absolute(path).string()) {

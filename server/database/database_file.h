@@ -13,14 +13,14 @@ namespace oblique::server {
 /// Throws StorageError when `path` exists and is not a regular file.
 void check_path(const std::string& path);
 
-/// Opens the database at `path` for reading only, without checking whether it is ours. SQLite may
-/// create an index of the write-ahead log beside the database. In a read-only folder it reads the
-/// rows in the log without that file. Throws StorageError if the file does not exist or cannot be
+/// Opens the database at `path` for reading only, without checking that it is one of ours. SQLite
+/// may create an index of the write-ahead log beside the database. In a read-only folder SQLite
+/// reads the log without an index file. Throws StorageError if the file does not exist or cannot be
 /// opened.
 DatabaseHandle open_for_reading(const std::string& path);
 
-/// Works like `open_for_reading`, and also throws StorageError, which describes the file, unless
-/// the file is a database of ours with tables.
+/// Works like `open_for_reading`, but also checks that the file is a database of ours with tables.
+/// If it is not, throws StorageError, which describes the file.
 DatabaseHandle open_stored(const std::string& path);
 
 /// Returns the type of the file system that holds `path`, as the system reports it, such as "ext4"

@@ -29,8 +29,8 @@ constexpr const char* kWayOut =
   throw StorageError("the database failed: " + reason);
 }
 
-/// Computes the CRC-32 of bytes that are added in small pieces. It buffers them, because each call
-/// of zlib costs as much as some hundred bytes.
+/// Computes the CRC-32 of bytes that are added in small pieces. Buffers the pieces, because one
+/// call of zlib takes as long as the checksum of some hundred bytes.
 class Crc {
  public:
   void add(const void* bytes, std::size_t size) {
@@ -59,7 +59,7 @@ class Crc {
         break;
       case SQLITE_FLOAT: {
         const double real = sqlite3_value_double(value);
-        // Both zeros have the same checksum, because SQLite may drop the sign of a zero.
+        // 0.0 and -0.0 have the same checksum, because SQLite may drop the sign of a zero.
         add_word('r', real == 0.0 ? 0 : std::bit_cast<std::uint64_t>(real));
         break;
       }

@@ -19,9 +19,9 @@ namespace {
 constexpr std::chrono::milliseconds kTick{100};
 /// Maximum time for sending the remaining output when the server ends.
 constexpr std::chrono::milliseconds kLinger{500};
-/// Maximum time for the messages of one port in one turn of the loop.
+/// Maximum time for the messages of one port in each turn of the loop.
 constexpr std::chrono::milliseconds kShareOfTurn{5};
-/// Time after the loss of the database in which the server answers requests with the reason.
+/// Time after the loss of the database in which the server still answers requests, with an error.
 constexpr std::chrono::seconds kFarewell{3};
 /// Maximum time for reading messages that have already arrived when the server ends.
 constexpr std::chrono::milliseconds kLongestLastRead{1000};
@@ -33,7 +33,7 @@ Instant now() {
           duration_cast<milliseconds>(std::chrono::system_clock::now().time_since_epoch()).count()};
 }
 
-/// Returns null without HTTP. If the address is in use and the server may run without HTTP, logs
+/// Returns null if HTTP is off. If the address is in use and the server may run without HTTP, logs
 /// the reason and returns null.
 std::unique_ptr<Web> make_web(const LoopSettings& settings) {
   if (!settings.web) {

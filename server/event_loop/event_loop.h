@@ -40,7 +40,7 @@ class CompletionQueue {
     completions_.push_back(std::move(completion));
     woken_.wake();
   }
-  /// Runs all queued functions. The event loop calls it.
+  /// Runs all queued functions. To be called by the event loop.
   void run() {
     woken_.clear();
     std::vector<Completion> completions;
@@ -110,12 +110,13 @@ struct LoopSettings {
   std::string client_port = "7600";
   QueryPoolSettings queries;
   NetworkLimits network;
-  std::optional<WebSettings> web;  ///< EventLoop sets database and solver version
+  std::optional<WebSettings> web;  ///< EventLoop sets the members `database` and `solver_version`
   /// Time to wait for leased batches after a request to stop; 0: none.
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once when the loop ends.
   std::function<void(const LoopState&)> on_turn = [](const LoopState&) {};
-  ServiceSettings service;  ///< solver_version must be set; other values come from the database
+  /// The caller must set `solver_version`. EventLoop sets the numbers that come from the database.
+  ServiceSettings service;
 };
 
 /// Outcome of a run of the loop.
@@ -143,7 +144,7 @@ class EventLoop final : private Ports {
 
   /// Runs until `stop_fd` becomes readable or the database is lost. Then notifies workers, stores
   /// and acknowledges received results, and returns. With `drain` it first waits for leased
-  /// batches; `take_stop` must read `stop_fd`, so that a second signal ends the wait.
+  /// batches. `take_stop` must read `stop_fd`, so that a second signal ends this wait.
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop = {});
 
  private:
@@ -182,7 +183,7 @@ class EventLoop final : private Ports {
 
   const std::chrono::milliseconds drain_;
   const std::function<void(const LoopState&)> on_turn_;
-  std::optional<Clock::time_point> drain_until_;  ///< nothing if it does not drain
+  std::optional<Clock::time_point> drain_until_;  ///< end of the wait for batches; empty: no wait
   AccessControl access_;
   Store store_;
   CompletionQueue completions_;
@@ -194,7 +195,7 @@ class EventLoop final : private Ports {
   Network::Port clients_;
   std::unique_ptr<Web> web_;
   bool is_ending_ = false;
-  std::vector<std::string> last_answered_;  ///< clients to which a message was sent at the end
+  std::vector<std::string> last_answered_;  ///< clients to which the ending server sent a message
   std::optional<Service> service_;
 };
 

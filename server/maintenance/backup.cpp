@@ -48,7 +48,7 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
   return found;
 }
 
-/// A table with ascending integer keys, and which of its rows to copy.
+/// A table with ascending integer keys, and the conditions for the rows to copy.
 struct KeyedRows {
   std::string table;
   std::string key;
@@ -57,8 +57,9 @@ struct KeyedRows {
   std::int64_t before_first = 0;  ///< a number below all keys
 };
 
-/// Inserts a row. Its first two columns are not inserted. Returns false if the row violates the
-/// schema and is therefore damaged. Throws std::runtime_error if the copy cannot be written.
+/// Inserts a row, without its first two columns (key and condition). Returns false if the row
+/// violates the schema and is therefore damaged. Throws std::runtime_error if the copy cannot be
+/// written.
 bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
   for (int column = 2; column < row.columns(); ++column) {
     insert.bind_column(column - 1, row, column);
@@ -85,10 +86,10 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
   const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
   const std::vector<std::string> found = texts(from, columns_sql);
   if (found.empty()) {
-    return 0;  // the table is lost
+    return 0;  // the damaged file has lost the table
   }
   std::vector<std::string> columns;
-  std::vector<std::string> lost;  // columns that are lost; then rows get no checksum
+  std::vector<std::string> lost;  // missing columns; if there are any, rows get no checksum
   for (const std::string& column : texts(to, columns_sql)) {
     (std::ranges::count(found, column) > 0 ? columns : lost).push_back(column);
   }
@@ -133,7 +134,7 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies", .key = "study_id"}, saved);
   copy_rows(from, to, {.table = "models", .key = "model_id"}, saved);
   copy_rows(from, to, {.table = "workers", .key = "worker_id"}, saved);
-  // Skips rows of lost studies, because they mean nothing without the recipe.
+  // Skips results of lost studies, because results mean nothing without a recipe.
   for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
               {.table = "results",
@@ -145,16 +146,16 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   }
 }
 
-/// Removes or repairs references to lost rows, and counts completed points. Studies and models with
-/// a damaged value lose their checksum; `check` compares their rows with the recipes.
+/// Removes or repairs references to lost rows, and counts completed points. Clears the checksum of
+/// studies and models with a damaged value; `check` compares their results with the recipes.
 void mend(sqlite3* database) {
   execute(database, fmt::format("UPDATE studies SET checksum = NULL WHERE checksum <> {};"
                                 "UPDATE models SET checksum = NULL WHERE checksum <> {};",
                                 kStudyChecksum, model_checksum_sql()));
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
-          // Rows keep the number of a lost worker, so that their checksums stay right. A lost
-          // worker gets the solver version of the other workers if all of these have the same one.
+          // Results keep the number of a lost worker, so that their checksums stay right. If all
+          // other workers have the same solver version, the lost worker gets this version too.
           "INSERT INTO workers"
           " (worker_id, name, threads, solver_version, instruction_set, joined_at)"
           " SELECT DISTINCT worker_id, 'lost with a damaged file', 1,"

@@ -23,10 +23,10 @@ struct Salvaged {
   std::uint64_t unreadable_places = 0;  ///< number of gaps: damaged pages or invalid values
 };
 
-/// Makes a sound database `to` from the readable rows of `from`. At each gap it loses at most as
-/// many readable rows as were unreadable. A server solves points without a row again. Does not
-/// change `from`, which no server may use meanwhile. Throws StorageError if `to` exists or `from`
-/// cannot be opened, and std::runtime_error if `to` cannot be written.
+/// Makes a sound database `to` from the readable rows of `from`. A gap of n unreadable rows costs
+/// at most n readable rows. A server solves points without a row again. Does not change `from`. No
+/// server may use `from` meanwhile. Throws StorageError if `to` exists or `from` cannot be opened,
+/// and std::runtime_error if `to` cannot be written.
 Salvaged salvage(const std::string& from, const std::string& to);
 
 }  // namespace oblique::server

@@ -79,7 +79,8 @@ class StudyCheck {
     study_faults_.push_back(fmt::format("study {}, {}: {}", studies_.integer(0), name_, fault));
   }
 
-  /// Reports values that a server never stores, because they could prevent its start or a display.
+  /// Reports values that a server never stores. They could prevent its start or the display of a
+  /// study.
   void check_terms() {
     constexpr std::int64_t kLongestTime = 64;
     for (const std::string& error :
@@ -129,7 +130,7 @@ class StudyCheck {
   /// (proto/recipe/point_table.h), because another machine computed the values. Fast for rows in
   /// the order of their points.
   std::string recipe_fault(const protocol::PointTable& table) {
-    if (rows_.number(0) >= table.size()) {  // a negative number becomes a large one
+    if (rows_.number(0) >= table.size()) {  // as unsigned, negative numbers are too large
       return "the study has no such point";
     }
     const protocol::Point point = table.point(rows_.number(0));
@@ -194,7 +195,7 @@ class StudyCheck {
   Statement studies_;
   Statement rows_;
   Statement definition_;
-  // model number in the recipe, and number of the row of `models`, that were last equal
+  // numbers of the last two equal models: in the recipe, and in the table `models`
   std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};
   std::string name_;  // name of the current study
   std::vector<std::string> study_faults_;
@@ -232,7 +233,7 @@ std::string row_fault_sql() {
 
 Diagnosis diagnose_contents(sqlite3* database) {
   Diagnosis found;
-  // The definition of a changed table could contain endless computations, so its rows are not read.
+  // A changed table may be defined with endless computations, so its rows are not read.
   for (const std::string& table : differing_tables(database)) {
     found.faults.push_back(fmt::format(
         "the table {} is missing or has other columns, so no server can use this file: `oblique "
@@ -266,7 +267,7 @@ Diagnosis diagnose(const std::string& path) {
   if (auto faults = faults_of_pages(database); !faults.empty()) {
     return {std::move(faults), {}};  // with damaged pages, other checks mean nothing
   }
-  execute(database, "BEGIN");  // makes rows and counts consistent while a server writes
+  execute(database, "BEGIN");  // one transaction, because a server may write meanwhile
   return diagnose_contents(database);
 }
 

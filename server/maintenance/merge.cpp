@@ -21,9 +21,9 @@
 namespace oblique::server {
 namespace {
 
-/// Opens the copy of a source. Throws StorageError for other columns and for damaged rows.
+/// Opens the copy of a source. Throws StorageError for wrong columns or damaged rows.
 DatabaseHandle open_sound_source(const std::string& path) {
-  // Maximum size of a stored value, which cannot be longer than the message that it was part of.
+  // Maximum size of a stored value. Values arrive in messages, whose size is limited.
   constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
   DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
   sqlite3_limit(database.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
@@ -95,7 +95,7 @@ class SourceMerge {
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
   void run() {
-    // numbers of studies in the source, each with its study in the target
+    // the number of each study of the source, with the study in the target
     std::vector<std::pair<std::uint64_t, StudyRow>> places;
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
     while (list.step()) {

@@ -50,7 +50,7 @@ class Merger {
   bool finish() { return target_.merge_log(); }
 
  private:
-  Store target_;  // this object also holds the lock
+  Store target_;  // also holds the lock on the target
   std::string path_;
 };
 

@@ -55,8 +55,8 @@ protocol::KeyPair read_server_key(const std::string& path) {
 
 using Keys = std::map<protocol::CurveKey, std::shared_ptr<const KeyIdentity>>;
 
-/// Returns `title` and the names of `keys` that `others` lacks or has changed; empty if there are
-/// none.
+/// Returns `title` and the names of the `keys` that `others` lacks or has with another identity;
+/// empty if there are none.
 std::string names_of_others(const char* title, const Keys& keys, const Keys& others) {
   std::string names;
   for (const auto& [key, identity] : keys) {

@@ -48,8 +48,8 @@ class AccessControl {
 
   /// Reads the list of keys twice a second. Returns true if the authorized keys have changed. Must
   /// be called often; `now_ms` is the time of a monotonic clock. A list that cannot be read, for
-  /// example during an edit, changes nothing; an empty list takes effect when it was read four
-  /// times. If every peer is admitted, logs a warning every ten minutes.
+  /// example during an edit, changes nothing. An empty list takes effect after four reads in a row.
+  /// If every peer is admitted, logs a warning every ten minutes.
   bool refresh(std::int64_t now_ms);
 
  private:

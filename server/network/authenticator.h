@@ -50,7 +50,7 @@ struct KeyIdentity {
 /// Outcome of sending a message to a peer.
 enum class Delivery {
   kSent,  ///< the message was sent or queued
-  kBusy,  ///< like kSent, but the peer should get no more work until it reads its output
+  kBusy,  ///< sent or queued; the peer leaves much unread and should get no more work now
   kGone,  ///< the peer has disconnected
 };
 

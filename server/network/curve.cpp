@@ -129,7 +129,8 @@ CurveHandshake::Outcome CurveHandshake::take_initiate(std::string_view initiate)
     return foreign;
   }
   std::memcpy(key_.data(), text.data(), kKeyBytes);
-  // Checks this before the list of keys, so that a forged INITIATE does not reveal listed keys.
+  // Checks the vouch before the list of keys, so that a forged INITIATE does not reveal which keys
+  // are listed.
   if (!is_vouched(std::string_view(text).substr(kKeyBytes, kVouchBytes), key_, short_term_key,
                   own_short_term_secret)) {
     return Refusal{RefusalCause::kFaulty, "it does not hold the secret half of its key"};
@@ -180,7 +181,7 @@ void CurveSession::seal(std::string_view body, std::string& out) {
   out += kMessageName;
   out += counter;
   const std::size_t mac_at = out.size();
-  out.append(kMacBytes + 1, '\0');  // the flags mean a single frame that is no command
+  out.append(kMacBytes + 1, '\0');  // flags 0: a single frame, not a command
   out += body;
   std::uint8_t* const mac = raw(out.data() + mac_at);
   crypto_box_detached_afternm(mac + kMacBytes, mac, mac + kMacBytes, body.size() + 1, nonce.data(),

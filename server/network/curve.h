@@ -100,19 +100,19 @@ class CurveSession {
 };
 
 /// The server's side of one handshake: the peer sends HELLO and then INITIATE. In between the
-/// server stores only the key of its cookie; the cookie contains all other state. So a command that
-/// was recorded on one connection is refused on another.
+/// server stores only the key of the cookie. The cookie, which INITIATE returns, contains all other
+/// state. So a command that was recorded on one connection is refused on another.
 class CurveHandshake {
  public:
   /// `security` must outlive this object.
   explicit CurveHandshake(const PortSecurity& security) : security_(security) {}
 
-  /// The data of WELCOME after HELLO, the peer's properties after INITIATE, or why it is refused.
+  /// The data of WELCOME (after HELLO), the peer's properties (after INITIATE), or a refusal.
   using Outcome = std::variant<std::string, Refusal>;
   /// Handles a command with this name and data. Takes about 0.1 ms.
   Outcome take(std::string_view command, std::string_view data);
-  /// Returns whether the peer has proved that it holds an admitted key. The functions below need
-  /// it.
+  /// Returns whether the peer has proved that it holds an admitted key. The functions below may be
+  /// called only then.
   bool is_done() const { return session_.has_value(); }
   const std::shared_ptr<const KeyIdentity>& identity() const { return identity_; }
   const protocol::CurveKey& key() const { return key_; }

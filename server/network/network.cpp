@@ -22,7 +22,7 @@ namespace {
 
 static_assert(CurveSession::kAddedBytes == protocol::kSealBytes);
 
-/// Epoll reports a number: below this value it is a port, from here on a peer.
+/// Epoll reports a number for each event. Numbers below this one are ports; the others are peers.
 constexpr std::uint64_t kFirstPeer = 16;
 constexpr std::size_t kOtherDescriptors = 128;
 constexpr std::size_t kFewestConnections = 16;
@@ -33,16 +33,16 @@ constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
 constexpr std::size_t kMaxPendingSteps = 64;
-/// The oldest handshake may be ended after handshake_ms / kPartOfOldest, and a recent one from the
-/// same source after handshake_ms / kPartOfNewest, to make room for another. With kPartOfOldest =
-/// 20 thousands of handshakes of a busy process fail.
+/// To make room for another handshake, the oldest may be ended after handshake_ms / kPartOfOldest,
+/// and a recent one from the same source after handshake_ms / kPartOfNewest. If kPartOfOldest were
+/// 20, thousands of handshakes of a busy process would fail.
 constexpr std::int64_t kPartOfOldest = 10;
 constexpr std::int64_t kPartOfNewest = 100;
 
 constexpr const char* kLeavesTooMuchUnread = "it does not read its output";
 
 void set_option(int socket, int level, int option, int value) {
-  // This fails if the peer has disconnected, which the next read reports.
+  // Fails only if the peer has disconnected. The next read reports that.
   static_cast<void>(setsockopt(socket, level, option, &value, sizeof value));
 }
 
@@ -76,7 +76,7 @@ class Network::Connection {
   bool has_pending_handshake() const {
     return zmtp_.pending_step() == Zmtp::PendingStep::kHandshake;
   }
-  /// Returns whether it has a message, or an encrypted frame that may contain a message.
+  /// Returns whether the peer has sent a message, or an encrypted frame that may contain a message.
   bool has_input_to_take() const {
     return zmtp_.has_message() || zmtp_.pending_step() == Zmtp::PendingStep::kSealedFrame;
   }
@@ -179,11 +179,11 @@ struct Network::Peer {
   Port port;
   std::int64_t since_ms;
   std::int64_t last_input_ms;
-  bool is_queued = false;  // true if it is in its port's queue or in `pending_steps_`
+  bool is_queued = false;  // true if the peer is in its port's queue or in `pending_steps_`
   bool is_paused = false;
   bool is_in_handshake = true;
   std::uint32_t watched_events = 0;  // 0: not in the epoll set
-  std::size_t held_in_bytes = 0;     // value that is included in the totals
+  std::size_t held_in_bytes = 0;     // this peer's part of the totals
   std::size_t waiting_out_bytes = 0;
   std::shared_ptr<const KeyIdentity> key;
 };
@@ -261,8 +261,8 @@ bool Network::has_more() const {
 
 void Network::accept_all(Port port) {
   constexpr std::size_t kMaxAtATime = 64;
-  // Accepts no more connections than can be handled in one turn. Others wait in the system, for
-  // example after a restart.
+  // Accepts no more connections than can be handled in one turn. Further connections, for example
+  // after a restart, wait in the kernel.
   const std::size_t most = ports_[port].security ? kStepsATurn / kStepsOfHandshake : kMaxAtATime;
   std::size_t taken = 0;
   for (std::size_t i = 0;
@@ -294,9 +294,9 @@ void Network::accept_all(Port port) {
   }
 }
 
-/// Returns true if the number of handshakes is at its limit and the oldest has not had its minimum
-/// time. Ending that handshake would not help: its peer would reconnect at once, and among many
-/// slow peers none would ever be admitted.
+/// Returns true if the number of handshakes is at its limit and the oldest may not be ended yet. If
+/// it were ended, its peer would reconnect at once, and among many slow peers none would ever be
+/// admitted.
 bool Network::must_newcomers_wait() const {
   return handshakes_.size() >= limits_.handshakes && !has_used(*handshakes_.begin(), kPartOfOldest);
 }
@@ -311,7 +311,8 @@ void Network::set_accepting(Port port, bool is_accepting) {
   epoll_ctl(epoll_.number(), EPOLL_CTL_MOD, ports_[port].listener->descriptor(), &event);
 }
 
-/// Ends a connection if another would exceed a limit. Returns false if the new one must be refused.
+/// Ends a connection if a new one would exceed a limit. Returns false if the new one must be
+/// refused.
 bool Network::make_room(Port port, const PeerAddress& address) {
   if (ports_[port].security && !make_room_at_source(address)) {
     return false;
@@ -322,10 +323,10 @@ bool Network::make_room(Port port, const PeerAddress& address) {
   return peers_.size() < limits_.connections || make_room_for_connection(port);
 }
 
-/// Applies the limit for one source address. Returns false if the new connection must be refused;
-/// if it waited, it would delay other sources. Ends the oldest handshake if it has had its minimum
+/// Applies the limit for one source address. Ends the oldest handshake if it has had its minimum
 /// time, else a recent one. So most handshakes of slow peers finish, and a fast peer is soon
-/// admitted among many that never finish.
+/// admitted among many that never finish. Returns false if the new connection must be refused. It
+/// cannot wait, because it would then delay other sources.
 bool Network::make_room_at_source(const PeerAddress& address) {
   constexpr std::size_t kPartForNewest = 8;
   const auto found = handshakes_of_.find(address.source);
@@ -403,7 +404,7 @@ void Network::serve(Number number, std::uint32_t events) {
   }
 }
 
-/// Runs a few pending steps. The limit lets connected peers be served in between.
+/// Runs at most kStepsATurn pending steps, so that connected peers are served in between.
 void Network::run_handshakes() {
   for (std::size_t steps = 0; steps < kStepsATurn && !pending_steps_.empty();) {
     const Number number = pending_steps_.front();
@@ -449,8 +450,8 @@ void Network::handshake_ended(Number number, Peer& peer) {
 }
 
 /// Updates the totals, the peer's place in a queue and the awaited events. Must be called after any
-/// change of a peer. While a message of the peer waits, its input is watched only if the system
-/// reports more: most messages are taken before that, which saves two system calls.
+/// change of a peer. While a message of the peer waits, its input stays watched until more input
+/// arrives. Most messages are taken earlier, which saves two system calls.
 void Network::update(Number number, Peer& peer) {
   const Connection& connection = peer.connection;
   update_sums(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());

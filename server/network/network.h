@@ -25,7 +25,7 @@ namespace oblique::server {
 /// Limits on memory and connections that peers can use. proto/protocol.md lists them.
 struct NetworkLimits {
   std::size_t connections =
-      limits::kConnections;  ///< maximum number at all ports; fewer if the system allows only fewer
+      limits::kConnections;  ///< maximum number at all ports; the system may allow fewer
   /// Maximum total size of messages that are incomplete or not taken. A peer has at most one
   /// message.
   std::size_t held_in_bytes = limits::kHeldInBytes;
@@ -59,7 +59,7 @@ struct Disconnect {
   std::string reason;  ///< why the server ended the connection; empty if the peer did
   /// has a value if the peer was not admitted, or if its key was revoked
   std::optional<RefusalCause> refused = {};
-  std::string address = {};  ///< such as 10.0.0.3:4711; empty without a reason
+  std::string address = {};  ///< such as 10.0.0.3:4711; empty if `reason` is empty
 };
 
 /// The server's ports and connections, with limits on everything that peers can make it store. A
@@ -128,9 +128,9 @@ class Network {
     std::unique_ptr<PortSecurity> security;
     std::size_t connections = 0;
     std::deque<Number> queue{};     // peers with a message, in order of their turns
-    std::size_t held_in_bytes = 0;  // total size of its peers' messages
+    std::size_t held_in_bytes = 0;  // total size of the messages of this port's peers
     std::vector<Number> paused{};   // peers that are not read while the port is full
-    bool is_accepting = true;       // if false, new connections wait in the system
+    bool is_accepting = true;       // if false, new connections wait in the kernel
   };
   class Connection;
   struct Peer;

@@ -292,7 +292,7 @@ void Zmtp::take_command(std::string_view body) {
   }
 }
 
-/// Opens the connection. Returns false if it refuses the properties.
+/// Validates the peer's properties and opens the connection. Returns false if they are invalid.
 bool Zmtp::take_properties(std::string_view properties) {
   std::string fault = validate_properties(properties);
   if (!fault.empty()) {

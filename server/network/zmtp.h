@@ -38,13 +38,14 @@ class Zmtp {
   /// Adds bytes that were received from the peer.
   void receive(std::string_view bytes);
 
-  /// Returns whether a complete message waits. Later bytes are examined after it was taken.
+  /// Returns whether a complete message waits. Later bytes are not examined until it has been
+  /// taken.
   bool has_message() const { return message_.has_value(); }
   /// Takes the waiting message. There must be one.
   std::string take_message();
 
   /// Expensive work that waits until the caller runs it: a handshake step, about 0.1 ms, or the
-  /// decryption of a frame, about 1 ns per byte. Later bytes are examined after it.
+  /// decryption of a frame, about 1 ns per byte. Later bytes are not examined until it has run.
   enum class PendingStep { kNone, kHandshake, kSealedFrame };
   PendingStep pending_step() const { return pending_step_; }
   /// Runs the pending step, if there is one.

@@ -65,7 +65,7 @@ void take_all_descriptors() {
   }
 }
 
-/// Returns why the text is not allowed, or "". It must be -1 or an open descriptor.
+/// Returns "" if the text is -1 or an open descriptor, else an error message.
 std::string descriptor_error(const std::string& text) {
   int fd = -1;
   const bool is_number = CLI::detail::lexical_cast(text, fd);
@@ -137,7 +137,7 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
 
 /// Adds options for the limits that users may set. server/study/limits.h has all limits.
 void add_limits(CLI::App& app, LoopSettings& loop) {
-  constexpr std::size_t kMax = 1'000'000;  // maximum of limits that are counts
+  constexpr std::size_t kMax = 1'000'000;  // largest value of an option that is a count
   constexpr std::size_t kLongestMessage = oblique::protocol::kMaxFrameBytes;
   constexpr std::size_t kMaxBytes = std::size_t{1} << 40U;
   const auto add = [&app](const char* name, auto& value, auto least, auto largest,

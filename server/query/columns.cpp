@@ -44,7 +44,7 @@ bool is_remade_by_view(const solver::ResultList& list) {
   return list.column == "phases" || list.column == "ft_peaks";
 }
 
-/// Returns SQL over the columns of `runs` for the list `part`, with all digits of its numbers.
+/// Returns SQL for the list `part` over the columns of `runs`. Numbers keep all their digits.
 std::string list_sql(const solver::ListPart& part) {
   const std::string list = fmt::format("runs.{}", part.list->column);
   if (part.member.empty()) {
@@ -115,8 +115,8 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-/// Returns whether a key may have several values over the points of a recipe: only some blocks have
-/// it, or it has several values, an expression or a distribution.
+/// Returns whether a key may have several values over the points of a recipe: its axis has several
+/// values, an expression or a distribution, or the blocks differ in it.
 bool varies(const protocol::Recipe& recipe, std::string_view key) {
   std::optional<std::string> first;  // the axis in the first block; empty if it has none
   for (const auto& block : recipe.blocks()) {

@@ -14,7 +14,8 @@ struct Column {
   std::string unit;        ///< SI unit; empty for pure numbers and texts
   std::string kind;        ///< input, output, row (a property of the row), element or function
   std::string solve_json;  ///< path in `solve --json`, such as energy.friction_J; or empty
-  std::string meaning;     ///< one line; with allowed values of an input or sign of an output
+  /// one line; for an input with the allowed values, for an output with the positive direction
+  std::string meaning;
   protocol::CellKind values = protocol::CellKind::kText;  ///< kind of all values except NULL
   /// true if the table `results` has the column in the same form as the view `runs`
   bool is_stored = false;

@@ -46,7 +46,7 @@ using Parts = std::array<Part, 4>;
 /// peaks[0].fn_N, peaks[0], fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from
 /// 0, like `seq` in the views; -1 is the last element. A missing element is NULL.
 struct Element {
-  std::size_t tokens = 0;  ///< number of the expression's tokens; 0 if it is no such expression
+  std::size_t tokens = 0;  ///< number of the expression's tokens; 0: not an element of a list
   std::string column;
   std::string sql;
   std::string unit;
@@ -449,7 +449,8 @@ bool requires_failure(std::string_view condition) {
 /// axes.
 const Interval* interval_of(const protocol::Axis& axis, const Intervals& intervals) {
   const auto found = intervals.find(column_of_key(axis.key()));
-  // Excludes lengths, because an axis of one link changes `length` too, and the text `integrator`.
+  // Excludes lengths, because an axis for one link also changes the column `length`. Excludes
+  // `integrator`, because it is a text.
   const bool is_own = protocol::has_own_values(axis) && !axis.key().starts_with("length") &&
                       axis.key() != "integrator";
   return found == intervals.end() || !is_own ? nullptr : &found->second;
@@ -471,7 +472,7 @@ std::uint64_t first_value_from(const protocol::Axis& axis, double value) {
 }
 
 /// Returns the indices of an axis's first and last value in `interval`; none if no value is in it.
-/// For a range the result is one value wider at each end.
+/// If the axis is a range, the result is one value wider at each end.
 std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval& interval) {
   if (axis.count() > 0) {
     if (interval.low > interval.high) {
@@ -491,8 +492,8 @@ std::optional<PointRange> numbers_in(const protocol::Axis& axis, const Interval&
   return found;
 }
 
-/// Returns the ranges of a block's points that may be in `intervals`, counted from 0. Loops over
-/// the axes from the last, which varies fastest, to the first.
+/// Returns the ranges of a block's points that may be in `intervals`. The block's first point is 0.
+/// Loops over the axes from the last, which varies fastest, to the first.
 Ranges ranges_in(const protocol::Block& block, const Intervals& intervals) {
   const std::uint64_t points = protocol::points_of_block(block);
   if (points == 0) {
@@ -550,7 +551,7 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   return found;
 }
 
-/// SQL that selects rows of a study, among them all rows that meet a condition.
+/// SQL that selects rows of a study. They include all rows that meet the condition.
 struct Rows {
   std::string sql;
   bool are_sorted = false;  ///< true if rows come in order of points without ORDER BY
@@ -581,7 +582,8 @@ Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& n
   std::string join;
   std::string condition;
   if (study.recipe.blocks().empty() || points_in(ranges) == study.points) {
-    condition = "1";  // with a range SQLite would not look up the points that the condition names
+    // A range would prevent SQLite from looking up the points that the user's condition names.
+    condition = "1";
   } else if (ranges.size() < 2) {
     condition = ranges.empty()
                     ? "0"
@@ -717,7 +719,7 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   auto& [select, where, group, order] = parts;
   const auto tokens = sql_tokens(select.written);
   for (const Part& part : parts) {
-    // In ORDER BY, SQL first looks for an alias of that name.
+    // In ORDER BY, SQL looks a name up among the aliases first. So aliases are allowed there.
     check_letter_case(part, &part == &order ? aliases_of(tokens) : Names());
   }
   check_grouped(select, group);

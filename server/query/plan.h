@@ -43,9 +43,9 @@ struct PointRange {
 
 /// Returns disjoint ascending ranges that contain every point of `recipe` that meets `condition`,
 /// and possibly other points. Uses only comparisons of an axis of a product block with numbers (=,
-/// <, <=, >, >=, BETWEEN), joined by AND. A range is one axis value wider at each end, because
-/// another machine may round a value differently. `condition` must have passed check_sql_part;
-/// empty: all points.
+/// <, <=, >, >=, BETWEEN), joined by AND. Widens ranges of an axis by one value at each end,
+/// because another machine may round values differently. `condition` must have passed
+/// check_sql_part; empty: all points.
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
 
 std::uint64_t points_in(const std::vector<PointRange>& ranges);

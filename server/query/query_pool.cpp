@@ -35,7 +35,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kRetryPause{20};
 constexpr std::int64_t kLongestWait_ms = 60'000;
-/// Value for a cancelled query, in place of its number of received chunks.
+/// For a cancelled query, this value replaces the number of received chunks.
 constexpr std::uint64_t kCancelled = UINT64_MAX;
 
 // ---- The reader process -------------------------------------------------------------------------
@@ -68,8 +68,8 @@ void confine() {
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);
   sqlite3_hard_heap_limit64(kHeapBytes);
-  // Errors of the next two calls are ignored, because the reader can run without them. The second
-  // one makes the kernel kill this process first when memory runs out.
+  // Errors of the next two calls are ignored, because the reader can run without them. With the
+  // second one the kernel kills this process first when memory runs out.
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
   std::ofstream("/proc/self/oom_score_adj") << "1000";
 }
@@ -275,7 +275,9 @@ struct QueryPool::Running {
 
   std::uint64_t ticket;
   std::int64_t time_limit_ms;
-  std::int64_t deadline_ms = 0;       ///< for the next chunk, or until the client receives one
+  /// deadline for the next chunk from the process or, while the query waits for the client, for the
+  /// client to receive one
+  std::int64_t deadline_ms = 0;
   std::int64_t answer_ends_ms = 0;    ///< deadline for the whole answer
   std::uint64_t given = 0;            ///< number of reported chunks
   std::uint64_t received_chunks = 0;  ///< number of chunks that the client has received
@@ -405,8 +407,8 @@ bool QueryPool::start_next() {
   return true;
 }
 
-/// Reports received frames, up to kChunksAhead more than the client has received. Returns false if
-/// the query has ended.
+/// Reports frames that the process has sent, at most kChunksAhead more than the client has
+/// received. Returns false if the query has ended.
 bool QueryPool::goes_on(Running& query) {
   while (!query.waits_for_client()) {
     auto frame = query.next_frame();

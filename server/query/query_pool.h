@@ -23,15 +23,17 @@ namespace oblique::server {
 /// A query of a client.
 struct QueryJob {
   std::uint64_t ticket;  ///< unique
-  std::string client;    ///< name of the client's key, or its connection without keys
+  std::string client;    ///< name of the client's key; without keys its connection
   protocol::QueryRequest request;
 };
 
 struct QueueSettings {
   std::size_t readers = limits::kRunningQueries;  ///< maximum number of running queries
-  std::size_t most_running_each = limits::kRunningQueriesOfClient;  ///< maximum number per client
+  /// maximum number of running queries per client
+  std::size_t most_running_each = limits::kRunningQueriesOfClient;
   std::size_t most_waiting = limits::kWaitingQueries;  ///< maximum number of waiting queries
-  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;  ///< maximum number per client
+  /// maximum number of waiting queries per client
+  std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;
   /// maximum total size of waiting statements [bytes]
   std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;
 };
@@ -120,7 +122,7 @@ class QueryPool {
   const protocol::WakeUp woken_;
   std::mutex mutex_;
   QueryQueue queue_;  // guarded by mutex_
-  // guarded by mutex_; number of chunks by ticket
+  // guarded by mutex_; number of received chunks, by ticket
   std::map<std::uint64_t, std::uint64_t> received_chunks_;
   bool stopping_ = false;       // guarded by mutex_
   std::list<Running> running_;  // used only by the pool's thread

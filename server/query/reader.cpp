@@ -108,8 +108,8 @@ void restrict_to_reading(sqlite3* database) {
   for (const auto& [name, value] : kSwitches) {
     sqlite3_db_config(database, name, value, nullptr);
   }
-  // Uses these virtual tables once, because SQLite creates them at their first use and the
-  // authorizer would refuse that.
+  // SQLite creates these virtual tables at their first use, which the authorizer would refuse
+  // later. So they are used here once.
   execute(database, "SELECT 1 FROM json_each('[]'), json_tree('[]')");
   add_functions(database);
   sqlite3_set_authorizer(database, &authorize, nullptr);
@@ -295,7 +295,8 @@ Answer Reader::answer(const protocol::QueryRequest& request, const QueryLimits& 
 
 std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name) {
   time_.end_ms = INT64_MAX;
-  // Counts come from `completed_ranges` and indices where possible, so that few rows are read.
+  // Counts come from `completed_ranges` and indices where possible, because reading many rows is
+  // slow.
   Statement list(database_.get(),
                  "SELECT s.study_id, s.name, s.state, s.points, s.created_at,"
                  " CASE s.counted WHEN 1 THEN (SELECT coalesce(sum(c.points), 0) FROM"

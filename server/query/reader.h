@@ -75,7 +75,7 @@ inline constexpr std::uint64_t kChunkBytes = std::uint64_t{256} << 10U;
 /// Time limit of a statement, which SQLite checks while the statement runs.
 struct TimeLimit {
   std::atomic<bool> is_interrupted = false;
-  std::int64_t end_ms = INT64_MAX;  ///< end of the limit on the steady clock
+  std::int64_t end_ms = INT64_MAX;  ///< end of the allowed time, on the steady clock
 };
 
 /// The rows of one statement in chunks. Holds a read transaction until it ends or is destroyed;

@@ -47,7 +47,7 @@ void check_beginning(std::string_view rest) {
   if (rest.front() == ';') {
     throw InputError("it has a semicolon");
   }
-  if (rest.starts_with("\xEF\xBB\xBF")) {  // SQLite would treat it as a space
+  if (rest.starts_with("\xEF\xBB\xBF")) {  // SQLite would read the mark as a space
     throw InputError("it has a byte-order mark");
   }
   if (rest.front() == '\0') {
@@ -55,8 +55,8 @@ void check_beginning(std::string_view rest) {
   }
 }
 
-/// Returns the length of a quoted text at the start of `rest`, whose quote opens at `open`. Inside,
-/// two quotes in a row stand for one quote.
+/// Returns the length of a text at the start of `rest` whose opening quote is at `open`. Two quotes
+/// in a row inside the text stand for one quote.
 std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   std::size_t end = open;
   do {

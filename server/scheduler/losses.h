@@ -35,7 +35,7 @@ enum class Suspicion : std::uint8_t {
   kSound,    ///< may be in a batch of any size with other points
   kSuspect,  ///< had several losses; is leased to a worker that holds nothing else
   kRisky,    ///< a single point; a worker was lost while it held only this point
-  kFailing   ///< several workers were lost with only this point; it fails unless one returns
+  kFailing   ///< several workers were lost with only this point; it fails if none of them returns
 };
 
 struct LossLimits {
@@ -48,7 +48,8 @@ class LossHistory {
  public:
   /// Adds a loss. A process counts once, but every loss of kNoProcess counts.
   void add(const Loss& loss) {
-    constexpr std::size_t kMaxNoted = 16;  // further losses count only if they are `alone`
+    // After this number of losses, only those with `alone` are added.
+    constexpr std::size_t kMaxNoted = 16;
     const auto known = std::ranges::find(losses_, loss.process, &Loss::process);
     if (loss.process != kNoProcess && known != losses_.end()) {
       known->alone = known->alone || loss.alone;
@@ -56,8 +57,8 @@ class LossHistory {
       losses_.push_back(loss);
     }
   }
-  /// Removes the losses of a process that has returned, because these points did not kill it.
-  /// Returns whether it had losses here.
+  /// Removes the losses of a process that has returned, because the points did not kill it. Returns
+  /// whether there were any.
   bool take_back(ProcessNumber process) {
     return process != kNoProcess &&
            std::erase_if(losses_, [&](const Loss& loss) { return loss.process == process; }) > 0;
@@ -88,7 +89,7 @@ struct WorkerProcess {
   std::optional<std::int64_t> proven_since_ms{};
   std::uint32_t lost_in_a_row = 0;   ///< number of losses since the process last solved a point
   std::uint64_t losses = 0;          ///< number of its leases that ended without an answer
-  std::set<StudyId> in_histories{};  ///< studies with this process in a loss history
+  std::set<StudyId> in_histories{};  ///< studies whose loss histories contain this process
 };
 
 /// The processes of all workers, including absent processes that may return.
@@ -103,7 +104,8 @@ class WorkerProcesses {
   /// Removes a connection. A process without connections may be forgotten.
   void leave(ProcessNumber number, WorkerId worker);
 
-  /// Removes a study from all processes, because no loss history of its points exists any more.
+  /// Removes a study from `in_histories` of all processes. To be called when the study's points
+  /// have no loss histories any more.
   void forget_study(StudyId study);
 
   /// Throws std::out_of_range for a process that was forgotten.
@@ -111,8 +113,8 @@ class WorkerProcesses {
   const WorkerProcess& at(ProcessNumber number) const { return processes_.at(number); }
   std::size_t size() const { return processes_.size(); }
 
-  /// Throws std::logic_error if the kept processes are not the expected ones, or do not have
-  /// `workers` connections in all.
+  /// Throws std::logic_error if the index or the list of absent processes is wrong, or if the
+  /// processes do not have `workers` connections in all.
   void check_invariants(std::size_t workers) const;
 
  private:
@@ -121,8 +123,8 @@ class WorkerProcesses {
   std::size_t most_absent_;
   ProcessNumber last_number_ = kNoProcess;
   std::map<ProcessNumber, WorkerProcess> processes_;
-  std::map<std::string, ProcessNumber> numbers_;  // number by ID of the process
-  std::deque<ProcessNumber> absent_;              // in the order in which they became absent
+  std::map<std::string, ProcessNumber> numbers_;  // process numbers, by ID of the process
+  std::deque<ProcessNumber> absent_;              // absent processes, the longest absent first
 };
 
 }  // namespace oblique::server

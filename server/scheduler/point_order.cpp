@@ -17,7 +17,8 @@ struct Piece {
   std::uint64_t fall;  ///< number of the fall
 };
 
-/// The points from `first` on as pieces with one fall each, and the first open point of each fall.
+/// The points from `first` on, split into pieces with one fall each, and the first open point of
+/// each fall.
 struct Falls {
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
@@ -46,8 +47,8 @@ struct Falls {
   std::vector<std::uint64_t> heads;  ///< first open point of each fall, or kNone
 };
 
-/// Returns whether points with the same fall may be apart. If each point has its own fall they may
-/// not.
+/// Returns whether several points of the block may share a fall. A distribution may give each point
+/// its own fall.
 bool may_share_falls(const protocol::Block& block) {
   const auto axes = protocol::model_axes(block);
   return std::none_of(axes.begin(), axes.end(), [](const protocol::Axis* axis) {
@@ -175,7 +176,7 @@ IntervalSet PointOrder::places(const IntervalSet& points) const {
       at += count;
     }
   });
-  std::ranges::sort(parts, {}, &Interval::begin);  // each insertion below is then at the end
+  std::ranges::sort(parts, {}, &Interval::begin);  // so that each insertion below is at the end
   IntervalSet places;
   places.insert(parts);
   return places;

@@ -13,17 +13,17 @@ namespace oblique::server {
 /// the order, from 0.
 ///
 /// Places equal point numbers until `arrange` is called for a study in which points of one fall are
-/// apart. It puts falls into groups that a worker solves side by side. A group begins with one
-/// point of each fall, so that the first batch contains all falls; its other points follow, fall by
-/// fall. Needs 20 bytes for each run of adjacent points with the same model.
+/// not adjacent. `arrange` puts falls into groups that a worker solves side by side. A group begins
+/// with one point of each fall, so that the first batch contains all falls; its other points
+/// follow, fall by fall. Needs 20 bytes for each run of adjacent points with the same model.
 class PointOrder {
  public:
   /// Maximum number of models of an arranged study. Finding falls takes about a microsecond a
   /// model.
   static constexpr std::uint64_t kMaxModels = 1'000'000;
 
-  /// Orders the points from `first` on if points of one fall are apart. `first` is 0 or the number
-  /// of ordered points. `open` contains the points that may be leased. Each group has
+  /// Orders the points from `first` on if points of one fall are not adjacent. `first` is 0 or the
+  /// number of ordered points. `open` contains the points that may be leased. Each group has
   /// `falls_a_group` falls with open points; the last group may have fewer.
   void arrange(const protocol::PointTable& table, std::uint64_t first, const IntervalSet& open,
                std::uint64_t falls_a_group);

@@ -136,7 +136,7 @@ void Scheduler::on(Study& study, const PriorityChanged& event) {
 }
 
 void Scheduler::on(Study& study, const FailuresForgotten& event) {
-  // The failed point must not be in its old lease, which may still run, when it gets a new lease.
+  // Ends old leases of the failed points, which may still run, before the points get a new lease.
   const IntervalSet places = study.points.order().places(event.points);
   for (const LeaseId id : std::set<LeaseId>(study.leases)) {
     const Lease& lease = leases_.at(id);
@@ -393,7 +393,7 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   Study& study = studies_.at(lease.study);
   study.leases.erase(id);
   const std::vector<Interval> held = open_places(lease);
-  // The other lease for the rest of this batch keeps the points.
+  // If another worker has a lease for the rest of this batch, that lease keeps the points.
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
     if (loss && !held.empty()) {
@@ -420,7 +420,8 @@ std::vector<Interval> Scheduler::open_places(const Lease& lease) const {
       .within(lease.batch.first_place, lease.batch.end());
 }
 
-/// Ends a lease whose points others have answered, and makes its worker drop the batch.
+/// If other workers have answered all points of a lease, ends it and makes its worker drop the
+/// batch.
 void Scheduler::release_if_answered(LeaseId id) {
   const auto lease = leases_.find(id);
   if (lease != leases_.end() && !has_open_points(lease->second)) {

@@ -28,8 +28,8 @@ struct StudyCounts {
   std::uint64_t left_out;  ///< number of points left out by a filter, as reported by workers so far
   std::uint64_t leased;
   bool cancelled;
-  std::string solver_version;  ///< version that made its results; empty without results
-  bool is_of_other_solver;     ///< its open points need another solver version
+  std::string solver_version;  ///< solver version of its results; empty without results
+  bool is_of_other_solver;     ///< true if its open points need another solver version
 
   std::uint64_t open() const { return points - completed; }
   std::uint64_t solved() const { return completed - std::min(completed, failed + left_out); }
@@ -56,8 +56,8 @@ struct WorkerCounts {
   std::uint64_t leased_points;
   std::uint64_t solved_points;
   std::int64_t silent_ms;
-  std::uint64_t losses;  ///< number of its process's leases that ended without an answer
-  bool is_proven;        ///< true if its process has solved leased points
+  std::uint64_t losses;  ///< number of leases of the worker's process that ended without an answer
+  bool is_proven;        ///< true if the worker's process has solved leased points
   bool is_set_aside;
   WorkerState state;
 };
@@ -157,7 +157,7 @@ class Scheduler {
     std::int32_t priority = 0;
     /// Number of batches leased since the study was last open. A long batch counts for several.
     double served = 0.0;
-    std::string solver_version{};  ///< version that made its results and leases; empty without both
+    std::string solver_version{};  ///< solver version of its results and leases; empty without both
     std::set<LeaseId> leases{};
     bool held = false;
     std::optional<Rank> rank{};  ///< the study's entry in `free_`
@@ -170,7 +170,7 @@ class Scheduler {
     WorkerId worker;
     StudyId study;
     Batch batch;
-    bool alone;  ///< true if it has suspect points; its worker then gets no other lease
+    bool alone;  ///< true if the points are suspect; the worker then gets no other lease
     std::int64_t granted_ms;
     LeaseId twin = 0;  ///< another worker's lease for the rest of this batch; 0: none
   };
@@ -178,11 +178,12 @@ class Scheduler {
   struct Pace {
     double busy_s = 0.0;  ///< thread time for `points`; recent messages have more weight
     double points = 0.0;
-    /// Like `busy_s` and `points`, but for messages with solved points, and counting only these.
+    /// Like `busy_s` and `points`, but for solved points only. Messages without solved points do
+    /// not count.
     double solved_busy_s = 0.0;
     double solved = 0.0;
-    std::uint64_t last_batch_points = 0;  ///< points that its pace allowed last
-    std::uint64_t last_end = 0;           ///< place at which its last batch ended; 0: no batch yet
+    std::uint64_t last_batch_points = 0;  ///< size of the last batch, or the wanted size if larger
+    std::uint64_t last_end = 0;           ///< place at which the last batch ended; 0: no batch yet
     std::uint64_t held_points = 0;        ///< number of points in its leases
 
     double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
@@ -191,16 +192,16 @@ class Scheduler {
   struct Worker {
     std::uint32_t threads;
     std::uint32_t credit = 0;
-    bool is_busy = false;  ///< true if it gets no batches
+    bool is_busy = false;  ///< the worker does not read its messages, so it gets no batch
     ProcessNumber process = kNoProcess;
-    LeaseId probe = 0;                        ///< lease of its probe, its only lease then; 0: none
+    LeaseId probe = 0;                        ///< lease of its probe; 0: it has no probe
     std::optional<std::int64_t> probed_ms{};  ///< time at which it got its last probe
     std::int64_t last_heard_ms;
     std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold leases
     std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    std::map<StudyId, std::uint64_t> defined;  ///< number of points in its recipe of each study
+    std::map<StudyId, std::uint64_t> defined;  ///< points in each recipe that the worker has
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;
@@ -285,7 +286,7 @@ class Scheduler {
   SchedulerSettings settings_;
   std::string solver_version_;
   WorkerProcesses processes_{settings_.most_absent_processes};
-  // times at which new processes were lost while they held points
+  // times of losses of new processes that held points
   std::deque<std::int64_t> vanished_ms_;
   std::map<StudyId, Study> studies_;
   std::set<Rank> free_;         // studies with free points to lease, in the order of service
@@ -294,7 +295,7 @@ class Scheduler {
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // workers with credit
-  // worker that gets nothing until it holds nothing, and then suspect points; 0: none
+  // worker that finishes its leases and then gets suspect points; 0: none
   WorkerId draining_ = 0;
   std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;

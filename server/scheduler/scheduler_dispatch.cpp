@@ -55,8 +55,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
     serve_suspect(id, worker, suspect_study);
     return true;
   } else if (draining_ == id || draining_ == 0) {
-    // Suspect points need a worker without leases. Only this worker waits for that; others
-    // continue.
+    // Suspect points need a worker without leases. Only this worker waits until it has none; other
+    // workers continue.
     draining_ = id;
     return false;
   }
@@ -66,8 +66,8 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   const StudyId study = std::get<StudyId>(*free_.begin());
   const BatchSize wanted = batch_size_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
-  // Stores the wanted size: a batch that ended early at the end of a run does not show the
-  // capacity.
+  // Stores the wanted size. If the run of points ends early, the batch is smaller, but that says
+  // nothing about the worker's capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
   return true;
@@ -76,7 +76,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
 void Scheduler::serve_suspect(WorkerId id, Worker& worker, StudyId study) {
   StudyPoints& points = studies_.at(study).points;
   stop_draining(id);
-  // Does not fill all lanes, because a quick answer matters more.
+  // The batch need not fill all SIMD lanes, because a quick answer matters more.
   const BatchSize wanted = batch_size_for(worker, study, false);
   grant(id, worker, study, *points.take(*suspect_for(points, worker), wanted), true);
 }
@@ -129,7 +129,7 @@ bool Scheduler::is_straggling(const Lease& lease, FastestPaces& paces) const {
   }
   const Worker& holder = workers_.at(lease.worker);
   if (leases_.at(*holder.leases.begin()).granted_ms < lease.granted_ms) {
-    return true;  // its worker must first solve an older batch
+    return true;  // an older batch delays this one
   }
   const double expected_ms = 1e3 * fastest_pace(lease.study, paces) *
                              static_cast<double>(lease.batch.points) / holder.threads;
@@ -145,7 +145,7 @@ StudyId Scheduler::next_suspect_study(const Worker& worker) const {
 
 /// Returns the suspicion of the points that the worker may get, or nothing. A risky point first
 /// goes to the worker that has been proven longest, because that worker is least likely to be lost
-/// for other reasons. An unproven worker gets no such points; a result here lets it get a probe.
+/// for other reasons. An unproven worker gets a probe instead of these points.
 std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
                                                 const Worker& worker) const {
   if (points.has(Suspicion::kRisky) &&
@@ -160,7 +160,7 @@ std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
 void Scheduler::stop_draining(WorkerId worker) {
   if (draining_ == worker) {
     draining_ = 0;
-    ready_workers_.unpark_all();  // another worker may have to give up its leases first
+    ready_workers_.unpark_all();  // another worker may now wait for suspect points
   }
 }
 
@@ -241,7 +241,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   Study& served = studies_.at(study);
   Pace& pace = worker.paces[study];
   const double takes_s = pace.s_per_point() * static_cast<double>(batch.points) / worker.threads;
-  // Limits the duration that counts, because a worker may report any pace.
+  // Limits the duration that counts for the study, because a worker may report a wrong pace.
   const double counted_s = std::clamp(takes_s, settings_.batch_target_s,
                                       settings_.lanes_batch_s + settings_.batch_target_s);
   served.served += counted_s / settings_.batch_target_s;

@@ -17,7 +17,8 @@ namespace oblique::server {
 using LeaseId = std::uint64_t;
 
 struct SchedulerSettings {
-  /// A worker counts as lost after this silence: three missed heartbeats. It is noticed within 3 s.
+  /// A worker counts as lost after this silence: three missed heartbeats. The server notices the
+  /// loss within 3 s.
   std::int64_t lost_after_ms = 2800;
   double batch_target_s = 0.1;                ///< target duration of a batch if the pace is known
   std::uint64_t first_batch_points = 4;       ///< points per thread if the pace is unknown
@@ -25,8 +26,8 @@ struct SchedulerSettings {
   /// Number of points, or of models' falls, that a thread solves side by side in nearly the time of
   /// a single one. A batch has at least this number per thread, unless that would take too long.
   std::uint64_t lanes = 8;
-  double lanes_batch_s = 10.0;  ///< maximum duration after filling lanes with points
-  double models_batch_s = 1.0;  ///< maximum duration after filling lanes with models
+  double lanes_batch_s = 10.0;  ///< maximum duration of a batch enlarged to fill lanes with points
+  double models_batch_s = 1.0;  ///< maximum duration of a batch enlarged to fill lanes with models
   std::uint64_t growth = 4;     ///< maximum growth factor from one batch of a worker to the next
   /// Number of batches per thread that each new batch leaves for later. So batches shrink toward
   /// the end of a study, and all workers finish together.
@@ -83,7 +84,7 @@ struct StudyAdded {
   bool cancelled = false;
   bool paused = false;
   std::int32_t priority = 0;
-  std::string solver_version{};  ///< version that made its results; empty without results
+  std::string solver_version{};  ///< solver version of its results; empty without results
   bool held = false;
   std::uint64_t left_out = 0;  ///< number of completed points that a filter leaves out
 };
@@ -178,7 +179,7 @@ struct WorkerUnreachable {
   std::vector<LeaseId> unsent{};
 };
 /// `is_busy` is true while the worker does not read its messages; it then gets no batch. The event
-/// is no sign of life.
+/// does not count as a sign of life.
 struct WorkerBusy {
   WorkerId worker;
   bool is_busy;
@@ -214,7 +215,8 @@ struct SendBatch {
   std::uint64_t count() const { return size_of(points); }
 };
 /// Store these results, then pass ResultsStored to the scheduler. Each Results message causes this
-/// effect, even without anything to store, because its acknowledgement follows all earlier commits.
+/// effect, even if there is nothing to store: the message is acknowledged after all earlier
+/// commits.
 struct StoreResults {
   WorkerId worker;
   StudyId study;

@@ -82,7 +82,7 @@ void Scheduler::fail_due_points() {
 
 // ---- Workers ----------------------------------------------------------------------------------
 
-/// Records the end of a worker, and of its leases, in its process.
+/// If the worker has ended with leases, updates the loss counts of its process.
 void Scheduler::note_end(const Worker& worker, WorkerEnd how) {
   if (worker.leases.empty()) {
     return;
@@ -135,9 +135,9 @@ void Scheduler::note_answers(Worker& worker, const ResultsReceived& event, bool 
   }
 }
 
-/// Ends the leases of stalled workers, so that others get the points. A stalled worker may be slow
-/// or may never solve anything. So nothing counts as lost, late results of the worker are stored,
-/// and it gets points again after it has solved one.
+/// Ends the leases of stalled workers, so that others get the points. A stalled worker may only be
+/// slow, so no point counts as lost, and late results of the worker are stored. The worker gets
+/// points again after it has solved a point.
 void Scheduler::end_stalled() {
   FastestPaces paces;
   bool any_stalled = false;
@@ -197,8 +197,8 @@ bool Scheduler::is_proven(const Worker& worker) const {
   return processes_.at(worker.process).proven_since_ms.has_value();
 }
 
-/// Returns whether the worker's process was lost repeatedly, or is new while new ones are being
-/// lost.
+/// Returns whether the worker's process was lost several times in a row, or is new while other new
+/// processes are being lost.
 bool Scheduler::is_set_aside(const Worker& worker) const {
   const WorkerProcess& process = processes_.at(worker.process);
   return process.lost_in_a_row >= settings_.set_aside_after ||
@@ -206,7 +206,8 @@ bool Scheduler::is_set_aside(const Worker& worker) const {
           now_ms_ - vanished_ms_.front() <= settings_.newcomers_watched_ms);
 }
 
-/// Returns whether no other worker has been proven for longer, ignoring workers that are set aside.
+/// Returns whether no other worker has been proven longer than this one. Ignores workers that are
+/// set aside.
 bool Scheduler::is_longest_proven(const Worker& worker) const {
   const auto since_ms = processes_.at(worker.process).proven_since_ms;
   return since_ms && std::ranges::none_of(workers_, [&](const auto& entry) {

@@ -9,8 +9,8 @@
 namespace oblique::server {
 namespace {
 
-/// Returns a batch end near `end`, at most `most`, that does not split the group `cut`, because two
-/// workers that share a group both solve its falls. A group that is too large is split.
+/// Returns a batch end near `end`, at most `most`, that does not split the group `cut`: if two
+/// workers share a group, both solve its falls. A group that is too large is split.
 std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_t end,
                           std::uint64_t most) {
   if (cut.begin > first && 2 * (cut.begin - first) >= end - first) {
@@ -28,7 +28,8 @@ StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t 
                          const LossLimits& limits)
     : table_(std::move(table)), limits_(limits), completed_(std::move(completed)) {
   completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());
-  left_out_ = std::min(left_out, completed_.size());  // an edited database may have a larger number
+  // A database that another program has edited may contain a larger number.
+  left_out_ = std::min(left_out, completed_.size());
   fresh_.insert(0, size());
   completed_.for_each(
       [this](const Interval& interval) { fresh_.erase(interval.begin, interval.end); });
@@ -272,10 +273,10 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
 }
 
-/// Returns the next fresh points for a batch that ends at `end` and has `leased` of `enough`
+/// Returns fresh points that extend a batch, which ends at `end` and has `leased` of `enough`
 /// points. Only a few completed points may lie in between, as in a fine grid that has reused
-/// results of a coarse grid. Returns none in the run up to `run_end`, where the batch was cut, and
-/// none of a group whose points do not all fit.
+/// results of a coarse grid. Returns nothing if the next fresh points are before `run_end`, where
+/// the batch was cut, or if their group does not fit into the batch.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
                                                 std::uint64_t enough, std::uint64_t leased) const {
   constexpr std::uint64_t kNear = 64;

@@ -17,12 +17,12 @@ namespace oblique::server {
 
 /// The size of a batch that a worker wants.
 struct BatchSize {
-  std::uint64_t points;      ///< target number; a batch ends with a group near it
+  std::uint64_t points;      ///< target number of points; a batch ends with a group near it
   std::uint64_t groups = 1;  ///< minimum number of groups, if they fit into `most_points`
   /// maximum number of points if that completes groups; 0: same as `points`
   std::uint64_t most_points = 0;
-  /// Number of falls that the worker solves side by side, which becomes the size of groups if the
-  /// study is arranged now. 0 if it must not be arranged, because leases refer to places.
+  /// Number of falls that the worker solves side by side. If the study is arranged now, its groups
+  /// get this size. 0: the study must not be arranged, because leases refer to places.
   std::uint64_t falls = 0;
   /// The place at which the worker's last batch ended. The rest of that batch's last group comes
   /// first, because the worker has already solved its falls.
@@ -59,7 +59,7 @@ struct Batch {
 class StudyPoints {
  public:
   /// `completed` contains the completed points, among them `left_out` points that a filter leaves
-  /// out. Does not make the table of a complete study.
+  /// out. If the study is complete, does not make the table.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 
@@ -83,7 +83,7 @@ class StudyPoints {
     std::uint32_t attempts;
     std::uint32_t alone;  ///< number of workers that were lost while they held only this point
   };
-  /// Returns the points that have been failing since `until_ms`, and moves them to committing.
+  /// Returns the points that began to fail at `until_ms` or earlier, and moves them to committing.
   std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
   /// Returns the leased points at the places `parts` to the sets of returned points, with the given
@@ -94,11 +94,12 @@ class StudyPoints {
   /// Removes the losses of this process from the histories of all returned points.
   void take_back_losses(ProcessNumber process);
 
-  /// Moves a point whose result was received to committing. Returns false if it was received before
-  /// or is not in the study.
+  /// Moves a point to committing, because its result was received. Returns false if a result was
+  /// received before or the point is not in the study.
   bool receive(std::uint64_t point);
 
-  /// Moves received left-out points to committing. Returns the moved points.
+  /// Moves left-out points to committing, because a worker has reported them. Returns the moved
+  /// points.
   IntervalSet receive(const IntervalSet& left_out);
 
   /// Completes a point whose result is durable. Returns false if the point was not committing.
@@ -122,7 +123,8 @@ class StudyPoints {
   bool may_leave_out(const IntervalSet& points) const;
   /// Returns whether any returned points have this level of suspicion.
   bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
-  /// Returns when the next points of this level were returned. There must be such points.
+  /// Returns the time at which the first points of this level, by place, were returned. There must
+  /// be such points.
   std::int64_t returned_ms(Suspicion suspicion) const {
     return returned(suspicion).begin()->second.returned_ms;
   }

@@ -247,7 +247,8 @@ ClientHandler::PendingRequests::iterator ClientHandler::cancel(PendingRequests::
     core_.ports.cancel_query(request->first);
   }
   if (const auto& job = request->second.trace; job && job->worker) {
-    // The worker may stop solving. It gets its next order after it has answered this one.
+    // The worker may stop solving the trace. It gets its next trace order after it has answered
+    // this one.
     protocol::ServerToWorker message;
     message.mutable_trace_cancel()->set_trace_id(request->first);
     core_.workers.send(*job->worker, message);

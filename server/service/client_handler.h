@@ -64,8 +64,8 @@ class ClientHandler {
     protocol::TraceOrder order{};
     protocol::TraceReply reply{};      ///< all fields except the trace
     bool is_ready = false;             ///< true if the inputs of the point are known
-    std::optional<WorkerId> worker{};  ///< the worker that solves it
-    std::set<WorkerId> declined_by{};  ///< the workers that declined it
+    std::optional<WorkerId> worker{};  ///< worker that solves the trace
+    std::set<WorkerId> declined_by{};  ///< workers that declined the trace
     bool has_lost_worker = false;
   };
   /// A request that waits for the check thread, the query pool or a worker.

@@ -28,7 +28,7 @@ bool Ports::reply_error(const Client& client, const std::string& message) {
 }
 
 bool Ports::reply_still_working(const Client& client, bool runs) {
-  // No request has this number, so clients that do not support the message ignore it.
+  // No request has this number, so clients that do not support StillWorking ignore the message.
   constexpr std::uint64_t kNoRequest = UINT64_MAX;
   protocol::ClientReply message;
   message.mutable_still_working()->set_request_id(client.request_id);

@@ -31,7 +31,7 @@ struct Client {
   /// Returns the name of the client's key; empty without keys.
   std::string key() const { return holder == nullptr ? std::string() : holder->name; }
   bool is_reader() const { return holder != nullptr && holder->role == protocol::Role::kReader; }
-  /// Returns the unit by which clients take turns: the key or, without keys, the connection.
+  /// Returns the name under which a client takes turns: its key or, without keys, its connection.
   std::string share() const { return holder == nullptr ? identity : "key " + holder->name; }
 
   bool operator==(const Client&) const = default;
@@ -86,8 +86,8 @@ class Ports {
 
 protocol::ClientReply error_reply(const std::string& message);
 
-/// Writes log lines that peers can cause at any rate: at most 20 in 10 s, then the number of
-/// others.
+/// Writes log lines that peers can cause at any rate: at most 20 lines in 10 s, then the number of
+/// suppressed lines.
 class PeerLog {
  public:
   explicit PeerLog(Ports& ports) : ports_(ports) {}

@@ -48,7 +48,7 @@ void Service::restore(StoredStudy study, const std::string& only_study, Instant 
   const StudyId id = study.study_id;
   states_.restore(study, now.steady_ms);
   const bool is_excluded = !only_study.empty() && study.name != only_study;
-  const bool looks_up = study.reuses && !is_excluded;  // its lookup of results has not ended
+  const bool looks_up = study.reuses && !is_excluded;  // the lookup of results has not ended
   feed(StudyAdded{id, study.table, std::move(study.completed), study.failures.size(),
                   study.state == StudyState::kCancelled,
                   study.state == StudyState::kPaused || is_excluded, study.priority,

@@ -95,8 +95,8 @@ void StudyChanges::write(const Client& client, StudyId id, Change change, OnStor
       });
 }
 
-/// If a change of the study is being written, stores `request` to be called afterwards, or refuses
-/// it. Returns whether it did so.
+/// If a change of the study is being written, stores `request` for later or refuses it, and returns
+/// true.
 bool StudyChanges::defers(const Client& client, StudyId id, std::function<void(Instant)> request) {
   const auto pending = pending_.find(id);
   if (pending == pending_.end()) {
@@ -465,8 +465,8 @@ void StudyChanges::reply_changed(const Client& client, const protocol::StudyStat
 
 // ---- Results of other studies ------------------------------------------------------------------
 
-/// Returns whether a study can reuse results. `solver_version` made the results that it already
-/// has; empty if it has none.
+/// Returns whether a study should reuse results. `solver_version` is the version of the study's own
+/// results; empty if it has none.
 bool StudyChanges::should_look_up(const ReadRequest& read, std::string_view solver_version) const {
   return !read.request.submit().no_reuse() && core_.states.have_results() &&
          (solver_version.empty() || solver_version == core_.solver_version);

@@ -18,11 +18,11 @@ namespace oblique::server {
 /// A parsed request of a client and, for a submission, the table of its recipe.
 struct ReadRequest {
   bool is_readable = false;             ///< if false, only the request number is valid
-  std::uint64_t request_id = 0;         ///< 0 if it cannot be read
-  protocol::ClientRequest request;      ///< has no recipe, because that is in `table`
+  std::uint64_t request_id = 0;         ///< 0 if the number cannot be read
+  protocol::ClientRequest request;      ///< without the recipe, which is in `table`
   StudyTable table;                     ///< set if the recipe is valid
   std::string recipe_error;             ///< why the recipe is invalid; empty if it is valid
-  bool needs_point_validation = false;  ///< true if its points must still be validated
+  bool needs_point_validation = false;  ///< true if the points must still be validated
 };
 
 /// Parses one frame, in time and memory proportional to its size: a long frame that is padded with
@@ -48,13 +48,14 @@ class StudyChanges {
   /// Handles a submission with a valid recipe.
   void submit(const Client& client, const ReadRequest& read, Instant now);
   void change(const Client& client, const protocol::ChangeRequest& request, Instant now);
-  /// Sets a study to done, because all its points are completed. While it grows, only records this.
+  /// Sets a study to done, because all its points are completed. While points are being added, only
+  /// records that the earlier points are completed.
   void finish(StudyId id, Instant now);
   /// Sends pending replies to submissions if the lookup of reusable results has ended or takes
   /// long, or the study is gone.
   void release_replies(Instant now);
 
-  /// A lookup ends early after this number of probes, or after this time, without a result.
+  /// A lookup ends early if this number of probes, or this time, gives no result.
   static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
   /// Looks up results of other studies for all open points, in parts. The scheduler must hold the
@@ -64,9 +65,9 @@ class StudyChanges {
   void stop_lookups() { lookups_stop_ = true; }
 
  private:
-  /// A change of a study that is being written.
+  /// A change that is being written, and the requests that wait for it.
   struct Pending {
-    bool grows = false;        ///< true if it adds points
+    bool grows = false;        ///< true if the change adds points
     bool is_complete = false;  ///< true if all earlier points have been completed
     std::vector<std::function<void(Instant)>> deferred{};  ///< later requests for the study
   };

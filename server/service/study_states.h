@@ -44,12 +44,13 @@ struct StudyRecord {
   std::string created_at;
   std::int32_t priority = 0;
   IntervalSet failures{};      ///< points whose row has an error
-  std::int64_t since_ms{};     ///< start of the time over which its rate is computed
+  std::int64_t since_ms{};     ///< start of the period over which the rate is computed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
   Reuse reuse{};
   StudyState state = StudyState::kRunning;
   bool is_durable = false;
-  /// True if a write was refused. The disk may have stored a part, which would count after a crash.
+  /// True if a write of the state was refused. The disk may contain a part of the write, which
+  /// would take effect after a crash.
   bool is_doubtful = false;
 };
 
@@ -89,8 +90,8 @@ class StudyStates {
   bool have_results() const { return have_results_; }
   void note_results() { have_results_ = true; }
 
-  /// Returns whether a state must be written: it differs or `is_doubtful`, and the study is not
-  /// done.
+  /// Returns whether the state must be written: the study is not done, and its state differs from
+  /// `wanted` or is doubtful.
   bool needs_write(StudyId id, StudyState wanted) const;
   /// Sets a state that is durable. A done study stays done until `reopen`.
   void set_state(StudyId id, StudyState state);

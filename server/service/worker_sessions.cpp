@@ -120,7 +120,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       break;
     }
     case Kind::kTrace:
-      input.events.emplace_back(CreditGiven{worker, 0});  // counts as a sign of life
+      input.events.emplace_back(CreditGiven{worker, 0});  // a sign of life of the worker
       input.trace_of = worker;
       input.trace = std::move(*message.mutable_trace());
       break;
@@ -139,7 +139,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
 void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHello& hello,
                            Instant now, const std::string& key, WorkerInput& input) {
   if (ledger_.is_gone() || !ledger_.has_room()) {
-    return;  // the worker will send it again
+    return;  // the worker will send the message again
   }
   if (const auto known = ids_.find(identity); known != ids_.end()) {
     const WorkerId old = known->second;

@@ -28,12 +28,12 @@ struct WorkerSessionSettings {
 struct WorkerRecord {
   std::string identity;
   AddWorker row;                  ///< the worker's row, stored with its first result
-  std::string key;                ///< name of its key; empty without keys
-  std::string host;               ///< name of its machine
-  std::int64_t last_sent_ms = 0;  ///< time of the last message to it; up to one tick too late
+  std::string key;                ///< name of the worker's key; empty without keys
+  std::string host;               ///< name of the worker's machine
+  std::int64_t last_sent_ms = 0;  ///< time of the last message to the worker, rounded up to a tick
   bool was_sent = false;          ///< true if a message was sent since the last tick
   bool is_busy = false;           ///< value of the last WorkerBusy event
-  bool has_row = false;           ///< true if the database has a row for it
+  bool has_row = false;           ///< true if the database has a row for the worker
 };
 
 /// The content of a worker's frame.
@@ -81,8 +81,8 @@ class WorkerSessions {
 
   /// Returns the time since a worker's last message [ms].
   using Silence = std::function<std::int64_t(WorkerId)>;
-  /// Sends a HeartbeatReply to workers whose heartbeat is late, and to workers to which
-  /// nothing was sent in that time. Must be called several times a second.
+  /// Sends a HeartbeatReply to each worker that has sent nothing, or was sent nothing, for 1.25
+  /// heartbeat intervals. Must be called several times a second.
   void tick(const Silence& silent_ms, Instant now);
   /// Returns events that occurred while messages were sent: unreachable or busy workers.
   std::vector<Event> take_events();

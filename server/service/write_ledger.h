@@ -14,8 +14,8 @@
 namespace oblique::server {
 
 struct LedgerLimits {
-  /// Maximum size of unstored results [bytes]. Above it no message of a worker is read. Above a
-  /// quarter of it no batch is sent until half of that quarter is stored.
+  /// Maximum size of unstored results [bytes]. Above it no message of a worker is read. From a
+  /// quarter of it on no batch is sent until the size falls below an eighth.
   std::size_t bytes = limits::kUnstoredBytes;
   /// Maximum number of unstored results, because many small messages use memory too.
   std::size_t writes = limits::kUnstoredWrites;
@@ -81,7 +81,7 @@ class WriteLedger {
     std::size_t writes = 0;
     std::size_t bytes = 0;
   };
-  /// Returns the total that includes the write.
+  /// Returns the load to which the write belongs: changes or results.
   Load& load_of(const Write& write) { return write.on_refused ? changes_ : results_; }
   void weigh();
 

@@ -55,7 +55,7 @@ struct SetPriority {
   std::int32_t priority = 0;
 };
 
-/// Deletes the rows of failed points among these points. A done study runs again.
+/// Deletes the rows of the given points that have failed. A done study runs again.
 struct ForgetFailures {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
@@ -116,15 +116,15 @@ struct ReusedResults {
 };
 
 /// Looks up one part of the study's open points, from `first_point` on, in the results of other
-/// studies, and copies the rows that it finds. Copies only rows of `solver_version`, and only if
-/// both studies request estimated errors or neither does.
+/// studies. Copies the rows that it finds. Copies only rows of `solver_version`. The two studies
+/// must both request estimated errors, or neither.
 struct ReuseResults {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
   std::shared_ptr<const protocol::PointTable> table;
   std::uint64_t first_point;
   std::string solver_version;
-  std::shared_ptr<ReusedResults> outcome;  ///< set when the change is written
+  std::shared_ptr<ReusedResults> outcome;  ///< set when the change has been written
 };
 
 /// Records that the lookup of results for a study has ended.
@@ -177,7 +177,7 @@ inline bool needs_full_sync(const Change& change) {
 enum class ClearedAway {
   kAll,   ///< no rows of deleted studies are left
   kPart,  ///< more rows may be left
-  /// no row was deleted, because readers keep the write-ahead log long; try again later
+  /// no row was deleted, because readers keep the write-ahead log from shrinking; try again later
   kMustWait,
 };
 

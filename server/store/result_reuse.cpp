@@ -17,8 +17,8 @@ namespace {
 /// Maximum number of points, and of lookups, in one change: about 50 ms if all have a result.
 constexpr std::uint64_t kPart = 4096;
 
-/// Selects the first row of another study that has these inputs, is solved and has a correct
-/// checksum, and the name of that study.
+/// Selects study, point and study name of the first row of another study that has these inputs, is
+/// solved and has a correct checksum.
 std::string find_sql() {
   return fmt::format(
       "SELECT r.study_id, r.point, s.name FROM results AS r INDEXED BY solved_points"

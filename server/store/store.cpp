@@ -131,7 +131,8 @@ void Store::commit(std::span<const Change> changes) {
     ranges_->forget();
     throw;
   }
-  file_.check();  // throws if the path belongs to another file, so that the transaction is lost
+  // Throws if the path belongs to another file, because the transaction is then lost.
+  file_.check();
   guard_syncs([this] { log_->shorten(); });
 }
 
@@ -290,7 +291,7 @@ void Store::add(const AddResults& change) {
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point inputs = protocol::inputs_of(result, *change.table);
     statements_->add_result.run(change, result, inputs, stored_model(change, inputs.model));
-    ranges_->add(change.study_id, result.point());  // done even if the point already had a row
+    ranges_->add(change.study_id, result.point());  // also if the point already had a row
   }
   if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
       !left_out.empty()) {

@@ -26,7 +26,7 @@ struct StoredStudy {
   StudyState state;
   std::string created_at;
   std::int32_t priority = 0;
-  std::string solver_version;  ///< version that made its results; empty without results
+  std::string solver_version;  ///< solver version of its results; empty without results
   IntervalSet completed;
   IntervalSet failures;        ///< completed points that failed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys

@@ -46,7 +46,7 @@ WriteAheadLog::WriteAheadLog(sqlite3* database) : database_(database) {
 }
 
 void WriteAheadLog::rewrite() {
-  const Transaction transaction(database_);  // locks out other writers
+  const Transaction transaction(database_);  // locks other writers out
   sqlite3_file* file = file_of(database_);
   const int code = file != nullptr ? write_again(file) : SQLITE_OK;
   if (code != SQLITE_OK) {

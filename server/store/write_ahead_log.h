@@ -27,7 +27,7 @@ class WriteAheadLog {
   /// Copies the whole log into the database and empties it. Returns false if a reader still needs
   /// the log. Throws StorageError.
   bool merge();
-  /// Returns whether readers keep the log so long that changes that are not urgent should wait.
+  /// Returns whether readers keep the log so large that less urgent changes should wait.
   bool is_held_long() const { return pages_ > kHeldLong * long_pages_; }
   /// Sets the length [pages] above which `shorten` copies the log.
   void shorten_at(int pages) { long_pages_ = pages; }

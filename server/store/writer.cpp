@@ -22,7 +22,7 @@ constexpr std::chrono::milliseconds kRetryPause{500};
 constexpr std::chrono::milliseconds kTendPause{1000};
 
 /// Number of rows of deleted studies that are deleted at a time (about 10 ms). Waiting jobs are
-/// written in between. After a failure the next attempt waits for the pause below.
+/// written in between. After a failure the next attempt waits for `kClearPause`.
 constexpr std::size_t kRowsAtOnce = 1000;
 constexpr std::chrono::milliseconds kClearPause{1000};
 
@@ -200,7 +200,7 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const std::exception&) {
-    // A full disk, for example, is reported by the next commit. The next step tries again.
+    // The next commit reports faults such as a full disk. The next step tries again.
   }
   return false;
 }
@@ -285,8 +285,8 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
   };
   for (WriteJob& job : jobs) {
     // Changes of one study must keep their order: "done, then retried" must not become "retried,
-    // then done". So once a job must wait, later jobs without a waiting client wait too, and all
-    // other later changes of its study are refused.
+    // then done". So when a job must wait, all later jobs without a waiting client wait too. Later
+    // jobs for its study with a waiting client are refused.
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

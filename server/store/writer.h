@@ -22,7 +22,7 @@ namespace oblique::server {
 /// Counts observed values in bins. Not thread-safe.
 class Histogram {
  public:
-  /// `bounds` must ascend. Each is the largest value of its bin. Larger values have one more bin.
+  /// `bounds` must ascend. Each is the largest value of its bin. One more bin counts larger values.
   explicit Histogram(std::vector<double> bounds)
       : bounds_(std::move(bounds)), counts_(bounds_.size() + 1) {}
 
@@ -99,11 +99,12 @@ class GroupCommit {
   /// Deletes at most `most` rows of deleted studies. Returns false if the next call should wait.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);
 
-  /// Checks the file of the database, and merges its log after a study is done. Must be called
+  /// Checks the file of the database. Merges the log after a study is done. Must be called
   /// regularly while no job waits.
   std::vector<WriteReport> maintain();
 
-  /// Merges the log. Returns false if that failed; then check `is_gone` before another attempt.
+  /// Merges the log. Returns false if that failed; the caller must then check `is_gone` before
+  /// another attempt.
   bool merge(std::vector<WriteReport>& reports);
   /// Returns the report of a failed `merge`.
   WriteReport unmerged() const { return {WriteReport::Kind::kUnmerged, 0, why_unmerged_}; }
@@ -121,7 +122,7 @@ class GroupCommit {
   bool gone_ = false;
   bool clears_ = false;        // true if rows of deleted studies may be left
   bool to_be_merged_ = false;  // true if a study is done, so that the log should be merged
-  int tries_ = 0;              // number of failed attempts to merge since then
+  int tries_ = 0;              // number of failed attempts to merge since the study was done
   std::string why_unmerged_;
 };
 

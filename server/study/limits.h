@@ -20,18 +20,19 @@ inline constexpr std::size_t kWaitingOutBytes = 64 * kMiB;
 inline constexpr std::size_t kUnstoredBytes = 64 * kMiB;
 /// Maximum number of running queries. Each uses a process and up to 256 MiB.
 inline constexpr std::size_t kRunningQueries = 4;
-/// Maximum number of points of all open studies; above it sums could overflow. Memory depends on
+/// Maximum number of points of all open studies. Above it sums could overflow. Memory depends on
 /// the number of intervals, not of points.
 inline constexpr std::uint64_t kOpenPoints = 10'000'000'000'000;
-/// Maximum number of batches that a worker may request at a time. More would wait at one worker
-/// while others have none.
+/// Maximum number of batches that a worker may request at a time. If one worker held more, other
+/// workers might have none.
 inline constexpr std::uint32_t kCredit = 1024;
 
 // ---- Connections ------------------------------------------------------------------------------
 
-/// Maximum size of messages of all peers that are incomplete or not taken yet.
+/// Maximum total size of messages from peers that are incomplete or not taken yet.
 inline constexpr std::size_t kHeldInBytes = 512 * kMiB;
-/// Maximum size of such messages at one port. Above it the port's peers are not read.
+/// Maximum size of incomplete and waiting messages at one port. Above it the peers of the port are
+/// not read.
 inline constexpr std::size_t kHeldInToPauseBytes = 64 * kMiB;
 /// A peer with more unsent output than this is busy: it gets no batch, and its requests are not
 /// read.
@@ -59,22 +60,23 @@ inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
 /// Maximum number and total size of long requests that wait for the check thread.
 inline constexpr std::size_t kWaitingChecks = 64;
 inline constexpr std::size_t kWaitingCheckBytes = 64 * kMiB;
-/// Maximum number of studies or workers in a reply, and its approximate maximum size. Such a reply
-/// takes the service's thread only some milliseconds.
+/// Maximum number of studies or workers in a reply, and the approximate maximum size of the reply.
+/// Such a reply takes the service's thread only some milliseconds.
 inline constexpr std::uint32_t kListed = 1000;
 inline constexpr std::size_t kListedBytes = kMiB;
 /// Maximum number of studies that are neither done nor cancelled. Each needs some kilobytes.
 inline constexpr std::size_t kOpenStudies = 100'000;
 
-/// Maximum number of recipes that the page requests at a time, and that it keeps. Each has up to 16
-/// MiB, and more when parsed.
+/// Maximum number of recipes that the page requests at a time, and of recipes in its cache. Each
+/// has up to 16 MiB, and more when parsed.
 inline constexpr std::size_t kRecipesOfPage = 4;
 
 // ---- Queries ----------------------------------------------------------------------------------
 
 /// Maximum number of running queries of one client, so that another client's query starts at once.
 inline constexpr std::size_t kRunningQueriesOfClient = 2;
-/// Maximum number of waiting queries. A statement may have a megabyte.
+/// Maximum numbers of waiting queries, in all and per client, and their maximum size in all. One
+/// query may have a megabyte.
 inline constexpr std::size_t kWaitingQueries = 64;
 inline constexpr std::size_t kWaitingQueriesOfClient = 16;
 inline constexpr std::size_t kWaitingQueryBytes = 16 * kMiB;
@@ -87,7 +89,7 @@ inline constexpr std::size_t kRunningTraces = 2;
 inline constexpr std::size_t kWaitingTraces = 64;
 /// Maximum number of traces that the page requests or sends at a time. Further requests wait.
 inline constexpr std::size_t kTracesOfPage = 4;
-/// Time from request to answer, including waiting: the default, and the maximum.
+/// Time from the request for a trace to its answer, including waiting: default and maximum.
 inline constexpr std::int64_t kTraceTime_ms = 60'000;
 inline constexpr std::int64_t kLongestTraceTime_ms = 600'000;
 

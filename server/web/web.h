@@ -67,7 +67,7 @@ class Web {
   /// Becomes readable when the page has requests.
   int descriptor() const { return service_.descriptor(); }
   std::vector<std::string> take_requests() { return service_.take(); }
-  /// Passes an encoded reply to the page. Returns true.
+  /// Passes an encoded reply to the page. Always returns true.
   bool put_reply(const std::string& frame);
   /// Must be called several times a second.
   void tick(const SnapshotSources& sources, std::int64_t now_ms);
@@ -84,7 +84,8 @@ class Web {
   HttpServer http_;  // declared last, because its thread uses the other members
 };
 
-/// Health: 200 if the latest snapshot, or the start, is recent, which means that the loop runs.
+/// Health: 200 if the latest snapshot is recent, which shows that the loop runs. Before the first
+/// snapshot the time of the start counts.
 HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms);
 
 /// Readiness: 200 unless the server is stopping, the database accepts no results, or its disk is

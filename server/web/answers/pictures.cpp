@@ -64,7 +64,7 @@ const AxisLayout* find(const std::vector<AxisLayout>& axes, std::string_view key
   return axis == axes.end() ? nullptr : &*axis;
 }
 
-/// One axis of a slice, and the values of it that are shown.
+/// One axis of a slice, and the shown values of the axis.
 struct Side {
   const AxisLayout* axis = nullptr;  ///< null for the second axis of a slice that is a line
   std::uint64_t first = 0;           ///< index of the first value in the requested part of the axis
@@ -183,7 +183,8 @@ enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFilte
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// Returns a JSON array of `first` plus the offset in point numbers of each cell along a side.
+/// Returns a JSON array with a number for each cell along a side: `first` plus the cell's offset in
+/// point numbers.
 std::string offsets_json(const Side& side, std::uint64_t first) {
   std::vector<std::uint64_t> offsets;
   for (const std::uint64_t number : side.numbers) {
@@ -390,8 +391,8 @@ struct BinSide {
     return fmt::format("max(min(CAST(({} - {}) * {} AS INTEGER), {}), 0)", place, sql_number(first),
                        sql_number(static_cast<double>(bins) / width), bins - 1);
   }
-  /// Sets the ends of the axis: those that the user gave, else those of `range`, the range of
-  /// values in the column, which is empty if no row has a value. Equal ends make one bin. Throws
+  /// Sets the ends of the axis. Ends that the user did not give come from `range`: the range of
+  /// values in the column, empty if no row has a value. Equal ends make one bin. Throws
   /// std::invalid_argument for wrong ends.
   void set_ends(std::optional<std::pair<double, double>> range) {
     least = typed_least.value_or(range ? range->first : typed_most.value_or(0.0));

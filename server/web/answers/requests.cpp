@@ -198,8 +198,8 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
-/// Sends requests about a study, which HTTP identifies by number and the service by name, until
-/// there is an answer. `request` makes the request from the name.
+/// Sends requests about a study until there is an answer. HTTP identifies a study by number, the
+/// service by name; `request` makes the request from the name.
 PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
                                std::function<ClientRequest(const std::string&)> request,
                                OnReply on_reply) {

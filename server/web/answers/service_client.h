@@ -97,9 +97,9 @@ class ServiceClient {
   Slots trace_slots_{limits::kTracesOfPage};
 };
 
-/// Sends requests to the service one after another. Each request except one for more rows has its
-/// own number, because a late error about the previous request may follow. The destructor ends the
-/// running request.
+/// Sends requests to the service one after another. Each request has a new number, because a late
+/// error about the previous request may follow. Only a request for more rows keeps the number. The
+/// destructor ends the running request.
 class ServiceExchange {
  public:
   explicit ServiceExchange(ServiceClient& service) : service_(service) {}

@@ -86,7 +86,7 @@ ordered_json columns_json() {
   return columns;
 }
 
-/// Returns the model of blocks without model axes, as a list of keys.
+/// Returns the recipe's model, without the axes of its blocks, as a JSON list of keys.
 ordered_json model_json(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message_unchecked(recipe.model());
   ordered_json keys = ordered_json::array();
@@ -166,8 +166,8 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   return protocol::to_message(model.model());
 }
 
-/// If the study has an H that the tip may not reach, returns the drop [m] up to which every tip is
-/// sure to reach H. Above it only a computed fall gives the answer.
+/// Returns the largest drop [m] that every tip of the study is sure to reach; nothing if no H is
+/// larger. For a larger H only a computed fall shows whether the tip reaches it.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
@@ -227,7 +227,7 @@ class Flow {
       slot_.reset();
       return go_on();
     }
-    if (error_) {  // the unchanged condition runs, so it did not cause the error
+    if (error_) {  // the condition alone gives no error, so `error_` has another cause
       return error_;
     }
     if (!protocol::is_sound(reply.query())) {
@@ -302,7 +302,7 @@ class Flow {
   ServiceExchange exchange_;
   ServedStudy study_;
   std::uint64_t points_ = 0;          // number of points in the study
-  std::shared_ptr<const void> slot_;  // held while the recipe is being requested
+  std::shared_ptr<const void> slot_;  // permission to request the recipe
   bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;
@@ -343,8 +343,7 @@ HttpAnswer check_answer(const std::string& body) {
 }
 
 protocol::SubmitRequest study_of_body(const std::string& body) {
-  // Maximum nesting of JSON, also Protobuf's. Copying or writing deeper JSON could overflow the
-  // stack.
+  // Maximum nesting of JSON. Copying or writing deeper JSON could overflow the stack.
   constexpr int kDeepest = 50;
   bool is_deep = false;
   auto whole = nlohmann::json::parse(

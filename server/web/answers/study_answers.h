@@ -22,8 +22,9 @@ namespace oblique::server {
 
 /// A study, as reported by the service.
 struct ServedStudy {
-  /// Returns whether the filter leaves out a point that has no row. If the study is done, the
-  /// answer is true: a worker decided it, and its values may differ from ours in the last digit.
+  /// Returns whether the filter leaves out a point that has no row. If the study is done, returns
+  /// true: a worker has decided so, and its values may differ in the last digit from those computed
+  /// here.
   bool leaves_out(std::uint64_t point) const {
     return table->has_filter() && (state == "done" || !table->passes_filter(point));
   }

@@ -184,7 +184,7 @@ void HttpServer::set_due(MHD_Connection* connection, Time due) {
 }
 
 /// Suspends a connection until the next wake. `wakes` is the number of wakes before the answer was
-/// polled; if another one has followed, does not suspend.
+/// polled. Does not suspend if there was another wake since then.
 void HttpServer::suspend(MHD_Connection* connection, std::uint64_t wakes) {
   const std::lock_guard lock(mutex_);
   MHD_suspend_connection(connection);
@@ -203,7 +203,7 @@ MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const 
   auto& server = *static_cast<HttpServer*>(self);
   try {
     if (*exchange == nullptr) {
-      auto* const begun = new Exchange;  // deleted by the callback for completed requests
+      auto* const begun = new Exchange;  // the callback for completed requests deletes it
       *exchange = begun;
       begun->request.method = method;
       begun->request.path = path;
@@ -242,7 +242,7 @@ MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
 }
 
 MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
-  const std::uint64_t wakes = wakes_;  // read first, so that no wake is lost meanwhile
+  const std::uint64_t wakes = wakes_;  // read before the poll, so that no wake is lost
   if (is_stopping_ || (exchange.pending && is_gone(connection))) {
     return MHD_NO;
   }
@@ -317,7 +317,7 @@ ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* i
                               std::size_t most) {
   Stream& stream = *static_cast<Stream*>(context);
   HttpServer& server = stream.server;
-  const std::uint64_t wakes = server.wakes_;  // read first, so that no wake is lost
+  const std::uint64_t wakes = server.wakes_;  // read before the stream, so that no wake is lost
   if (server.is_stopping_ || is_gone(stream.connection)) {
     return MHD_CONTENT_READER_END_WITH_ERROR;
   }

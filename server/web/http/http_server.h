@@ -28,8 +28,8 @@ struct HttpLimits {
   /// A connection is closed after this time without any transfer, except while the server prepares
   /// its answer. The head of a request must arrive within this time after connecting.
   std::chrono::seconds idle{10};
-  /// Requests and answers, except streams, may take `idle` plus one second per this number of
-  /// bytes.
+  /// The transfer of a request or answer, except a stream, may take `idle` plus one second per this
+  /// number of bytes.
   std::size_t least_bytes_a_second = std::size_t{4} * 1024;
 };
 

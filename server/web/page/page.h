@@ -54,8 +54,8 @@ class PageToken {
 struct PageSettings {
   PageToken token;
   bool shows_without_token = false;  ///< if true, reading needs no token
-  /// True if the server belongs to `oblique view` and ends with it. Commands that the page shows
-  /// must then read the file.
+  /// True if the server belongs to `oblique view` and ends with it. The page then shows commands
+  /// that read the file.
   bool is_of_file = false;
 };
 

@@ -25,7 +25,8 @@ std::string text_of(double value) {
   return std::isnan(value) ? "NaN" : solver::exact_number(value);
 }
 
-/// Writes metrics in Prometheus' text format. Labels have fixed words, which need no escaping.
+/// Writes metrics in Prometheus' text format. Values of labels are fixed words, which need no
+/// escaping.
 class MetricText {
  public:
   void gauge(std::string_view name, std::string_view help) { family(name, "gauge", help); }

@@ -27,8 +27,8 @@ class Service;
 /// points count running and paused studies unless stated otherwise.
 struct Snapshot {
   std::int64_t made_ms = 0;         ///< time on the steady clock
-  std::uint64_t points_solved = 0;  ///< number of points stored since the server started
-  std::uint64_t points_failed = 0;  ///< number of points stored since the server started
+  std::uint64_t points_solved = 0;  ///< solved points stored since the server started
+  std::uint64_t points_failed = 0;  ///< failed points stored since the server started
   std::uint64_t points_open = 0;    ///< number of open points in running studies
   std::uint64_t points_leased = 0;
   double points_per_s = 0.0;
