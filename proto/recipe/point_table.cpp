@@ -67,8 +67,8 @@ void in_block(const Recipe& recipe, std::size_t number, Act act) {
   }
 }
 
-/// Calls `act` with every number below `points`. If there are more than `most`, calls it with
-/// `tries` random numbers instead. Returns whether it used every number.
+/// Calls `act` with every number below `points`, or with `tries` random ones if `points` exceeds
+/// `most`. Returns whether `act` was called with every number.
 template <typename Act>
 bool for_each_or_some(std::uint64_t points, std::uint64_t most, std::uint64_t tries,
                       std::uint64_t seed, Act act) {
@@ -114,7 +114,7 @@ class PointTable::BlockPoints : public BlockPlace {
   const Block& definition() const { return *block_; }
   std::uint64_t points_per_model() const { return points / models; }
 
-  /// Returns the values of a point in the order of the axes, which the functions below need.
+  /// Returns the values of a point in the order of the axes. The functions below need these values.
   std::vector<double> values_at(std::uint64_t point) const {
     std::vector<double> values(sources_.size());
     for (std::size_t i = 0; i < sources_.size(); ++i) {
