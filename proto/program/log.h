@@ -13,7 +13,7 @@ struct LogSettings {
 /// Makes spdlog's default logger write lines such as
 ///     2026-11-21T05:46:10.153Z oblique-server info: ready
 /// to standard error, with times in UTC. Text from outside is escaped (text.h), so that no peer can
-/// control a terminal or forge a line. If standard error is systemd's journal, the lines have no time
+/// control a terminal or forge a line. If standard error is systemd's journal, the lines lack time
 /// and program name, because the journal adds these:
 ///     <6>ready
 /// where the number is the level. With format "json" each line is a JSON object with

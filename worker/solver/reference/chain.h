@@ -64,7 +64,7 @@ class ElementChain {
 
  protected:
   struct Element {
-    std::array<Eigen::Index, 4> row;  ///< of p_i, s_i, p_j, s_j
+    std::array<Eigen::Index, 4> row;  ///< rows of p_i, s_i, p_j, s_j
     std::size_t link;
   };
 
