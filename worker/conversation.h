@@ -137,8 +137,8 @@ struct ConversationSettings {
   Doubling hello_timeout{3000, 12'000};
   Doubling backoff{50, 2000};           ///< pause between failures
   Doubling rejection{2000, 30'000};     ///< pause after the server rejects the socket
-  std::int64_t stop_timeout_ms = 2000;  ///< for the server to acknowledge the results
-  std::int64_t stop_repeats_ms = 1000;  ///< until then a second request to stop is ignored
+  std::int64_t stop_timeout_ms = 2000;  ///< time for the server to acknowledge the results
+  std::int64_t stop_repeats_ms = 1000;  ///< for this time a second request to stop is ignored
   ExitSettings exit = {};
 };
 

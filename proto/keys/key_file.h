@@ -128,10 +128,10 @@ std::string find_key_folder(const std::string& named);
 /// creating any.
 CurveKey make_key_folder(const std::string& folder);
 
-/// Adds `public_key` to the list. If that is absent, creates a key pair, writes it to NAME.key and
-/// adds its public key. Throws solver::InputError if the list has the name or key already or the
-/// server's key cannot be read, and std::runtime_error if a file exists or cannot be written. After
-/// an error the list is unchanged.
+/// Adds `public_key` to the list. Without `public_key`, creates a key pair, writes it to NAME.key
+/// and adds its public key. Throws solver::InputError if the list has the name or key already, or
+/// if the server's key cannot be read. Throws std::runtime_error if a file exists or cannot be
+/// written. After an error the list is unchanged.
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key);
 

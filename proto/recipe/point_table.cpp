@@ -577,8 +577,8 @@ std::vector<std::uint64_t> some_points(const PointTable& table) {
 }
 
 /// Counts the different falls of the study. `some` contains all points or random ones. For random
-/// points the number is estimated (Good 1953): the share of the study's points whose fall occurs in
-/// `some` is about the share of points in `some` whose fall occurs there at least twice.
+/// points the number is estimated (Good 1953): a point of the study has a fall of `some` about as
+/// probably as a point of `some` shares its fall with another point of `some`.
 void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some, StudySize& size) {
   std::unordered_map<std::uint64_t, std::uint64_t> met;  // number of points by hash of their fall
   std::optional<std::uint64_t> model;  // model of the last point; `fall` is the hash of its fall

@@ -28,7 +28,7 @@ std::string fixed_number(double value, int decimals);
 std::string signed_number(double value, int decimals);
 
 /// Parses a text written by `exact_number`, infinities and NaN included. Returns nothing for other
-/// text, also with spaces or a plus.
+/// text, such as one with spaces or a plus.
 std::optional<double> number_of(std::string_view text);
 
 }  // namespace oblique::solver

@@ -133,9 +133,9 @@ class ContactMargin {
   double last_vn_m_s_ = 0.0;  ///< at the start of the last step
   double last_step_s_ = 1.0;
   bool has_turned_ = false;
-  bool stick_follows_slip_ = false;  ///< false if the present stick began at touch
-  double back_m_s_ = 0.0;            ///< maximum in stick of P's slip speed against its last slip
-  double left_side_ = 0.0;           ///< slip direction of the limit that F_t leaves next, or 0
+  bool stick_follows_slip_ = false;     ///< false if the present stick began at touch
+  double back_m_s_ = 0.0;               ///< largest speed during stick at which P would slide back
+  double left_side_ = 0.0;              ///< slip direction of the limit that F_t leaves next, or 0
   std::optional<double> slip_began_m_;  ///< position of P when the last slip began
 };
 
