@@ -102,7 +102,7 @@ class BatchSolver::Task : public solver::PointSource {
   std::uint64_t end_ = 0;                        ///< after the last position
   std::vector<protocol::PointResult> results_;   ///< not yet moved to the solver
   std::vector<Batch::Range> left_out_;           ///< not yet moved to the solver
-  Clock::time_point busy_since_ = Clock::now();  ///< start of the work on these
+  Clock::time_point busy_since_ = Clock::now();  ///< start of the work on these results
 };
 
 BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)

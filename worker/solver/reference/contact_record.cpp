@@ -42,8 +42,8 @@ void ContactRecord::add_turn(const ContactLaw& before, const TipState& tip, doub
   turns_.push_back({t_s, before.fn_N(tip), 0.0});
 }
 
-/// Adds the slide of the last regime. Drops a regime without duration, such as a slip found by
-/// rounding where both forces vanish together.
+/// Adds the slide of the last regime. Drops a regime without duration, such as a slip that rounding
+/// causes where both forces vanish together.
 void ContactRecord::close_state(const ContactLaw& law, const TipState& tip, double t_s) {
   const double xP = law.xP_m(tip);
   if (!states_.back().stick) {
@@ -211,7 +211,7 @@ void ContactMargin::add_event(const ContactLaw& before, ContactEvent event, cons
   const bool is_stick = event == ContactEvent::kStick;
   const bool is_separation = event == ContactEvent::kSeparation;
   if (event == ContactEvent::kTangentialExtremum || (is_stick && before.mu() == 0.0)) {
-    return;  // no change of state; without friction P reverses
+    return;  // the state does not change: without friction P reverses
   }
   const double s = before.slip_direction();
   if (!is_turn && !is_separation && turn_.rises) {
