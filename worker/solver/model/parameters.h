@@ -92,7 +92,7 @@ void validate_point(const ModelParameters& model, double H_m, double mu, double 
 std::string_view integrator_name(Integrator integrator);
 /// Throws InputError for an unknown name.
 Integrator integrator_named(std::string_view name);
-/// In the order of the enumerators.
+/// Returns the names in the order of the enumerators.
 std::span<const std::string_view> integrator_names();
 
 /// The model of a preset: `standard`, `paper`, `printed` or `converged`. Throws InputError for
@@ -106,9 +106,9 @@ struct MeshAccuracy {
   int elements_per_link;
   double forces_off;
   double duration_off;
-  double same_mode;  ///< points with the same major mode
+  double same_mode;  ///< share of points with the same major mode
 };
-/// In the order from coarse to fine meshes.
+/// Returns the accuracies from coarse to fine meshes.
 std::span<const MeshAccuracy> mesh_accuracies();
 
 /// `model` with the default of every parameter that does not affect its fall: k, eta2, dt, a

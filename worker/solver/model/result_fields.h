@@ -16,7 +16,7 @@ namespace oblique::solver {
 template <class T>
 struct Member {
   using Value = T;
-  const T* (*of)(const CaseResult& result);  ///< returns nullptr when absent
+  const T* (*of)(const CaseResult& result);  ///< null if the member is absent
   T& (*in)(CaseResult& result);  ///< creates the member; null for a member that a list determines
   bool may_be_absent = false;
 };

@@ -135,7 +135,7 @@ class ContactMargin {
   bool has_turned_ = false;
   bool stick_follows_slip_ = false;     ///< false if the present stick began at touch
   double back_m_s_ = 0.0;               ///< largest speed during stick at which P would slide back
-  double left_side_ = 0.0;              ///< slip direction of the limit that F_t leaves next, or 0
+  double left_side_ = 0.0;              ///< direction of a slip that ended with the last step, or 0
   std::optional<double> slip_began_m_;  ///< position of P when the last slip began
 };
 
