@@ -11,8 +11,8 @@
 
 namespace oblique::protocol {
 
-/// Maximum absolute value of a number in a result, in SI units. No finger reaches it, and it is
-/// finite in every unit in which it is shown.
+/// Maximum absolute value of a number in a result, in SI units. No real finger reaches it. It is
+/// finite in every unit in which results are shown.
 inline constexpr double kLargestOutput = 1e100;
 /// Maximum number of elements of a list in a result, such as peaks. Real results have some dozens.
 inline constexpr int kMaxListElements = 4096;
@@ -33,9 +33,9 @@ solver::CaseResult from_message(const PointResult& message);
 /// Returns the message for a failed point. An empty reason becomes "unknown".
 PointResult failed_point(std::uint64_t point, const std::string& reason);
 
-/// Returns why a received result is invalid, or an empty text. A result is invalid if it has
-/// another number of scalars than it should, lacks a required scalar, has a number that is not
-/// finite or exceeds kLargestOutput, has lists of impossible length, or is too large.
+/// Returns why a received result is invalid, or an empty text. A result is invalid if it has a
+/// wrong number of scalars, lacks a required scalar, has a number that is not finite or exceeds
+/// kLargestOutput, has lists of impossible length, or is too large.
 std::string fault_of(const PointResult& message);
 
 /// Maximum size of the rows of a trace [bytes]. With its result and model it fits into one frame.
@@ -51,8 +51,8 @@ void set_protocol(WorkerHello& hello);
 /// Returns the names of the scalars that this build sends and expects, separated by spaces.
 std::string sent_outputs();
 
-/// Returns why the server refuses the worker, or an empty text. The worker may have another
-/// protocol version, or its results other outputs.
+/// Returns why the server refuses the worker, or an empty text. Reasons are another version of the
+/// protocol and other outputs in the worker's results.
 std::string hello_error(const WorkerHello& hello);
 
 /// Returns the number of points that are solved, failed or left out by a filter.

@@ -98,7 +98,7 @@ Character first_character(std::string_view text) {
     }
     code = (code << 6U) | (byte & 0x3fU);
   }
-  // Invalid: a code point that is encoded too long, half of a UTF-16 pair, or above the last one.
+  // Invalid: an overlong encoding, half of a UTF-16 pair, and a number above the last code point.
   constexpr std::array<char32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
   const bool is_sound =
       code >= kLeast.at(bytes) && !(code >= 0xd800 && code <= 0xdfff) && code <= 0x10ffff;

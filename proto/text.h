@@ -11,8 +11,7 @@ namespace oblique::protocol {
 /// messages of other processes. Escapes everything that would control a terminal, forge a log line
 /// or be invisible: control characters (C0, DEL and C1), marks of writing direction, zero-width
 /// characters, Unicode's line and paragraph separators, and bytes that are not UTF-8. ESC becomes
-/// \x1b, U+202E \u202e, a line break
-/// .
+/// \x1b, U+202E \u202e, a line break \n.
 std::string visible(std::string_view text);
 
 /// Works like `visible`, but keeps line breaks, for messages of several lines.

@@ -68,9 +68,8 @@ std::string toml_string(std::string_view text) {
 toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // messages of toml++ may contain long keys
   constexpr std::size_t kMaxKeyParts = 100;
-  // The nesting of tables equals the number of parts of their keys, and destructors of tables
-  // recurse. This check runs before parsing, so it also counts dots in other text without a comma
-  // or an equals sign.
+  // A key with many parts makes deeply nested tables, whose destructors recurse. This check runs
+  // before parsing. So it also counts dots in other text that has no comma or equals sign.
   std::size_t parts = 1;
   std::size_t line = 1;
   for (const char c : text) {

@@ -40,8 +40,8 @@ class TomlReader {
   /// "study.toml:3:6"
   std::string place(const toml::source_region& at) const;
 
-  /// Calls `work`. If that throws an InputError without a place, adds the place of its key in the
-  /// table `at`, or else the place of `at`.
+  /// Calls `work`. If that throws an InputError without a place, adds the place of the error's key
+  /// in the table `at`, or else the place of `at`.
   template <typename Work>
   decltype(auto) located(const toml::node& at, Work work) const {
     try {

@@ -35,7 +35,7 @@ class Batch {
   std::uint64_t first_to_solve(std::uint64_t at, std::uint64_t end) const;
   /// Adds the points at the positions [begin, end) to `ranges`. May extend the last range.
   void append_points(std::uint64_t begin, std::uint64_t end, std::vector<Range>& ranges) const;
-  /// The position after the consecutive points of one model that begin at `position`.
+  /// Returns the end of the run of points of one model that begins at `position`.
   std::uint64_t end_of_model(std::uint64_t position) const;
 
  private:
@@ -48,7 +48,7 @@ class Batch {
 
   std::uint64_t number_;
   std::uint64_t study_id_;
-  std::vector<Run> runs_;  ///< consecutive points, up to the position of the next run
+  std::vector<Run> runs_;  ///< each run of consecutive points ends where the next begins
   std::uint64_t size_ = 0;
   std::shared_ptr<const protocol::PointTable> points_;
 };

@@ -59,7 +59,7 @@ class BatchSolver::Task : public solver::PointSource {
   /// Moves the results to the solver. The caller must hold the lock.
   void pass_on() {
     if (results_.empty() && left_out_.empty()) {
-      return;  // the time so far is added to the next results
+      return;  // the next results include the time so far
     }
     const Clock::time_point now = Clock::now();
     if (!open_.unwanted) {
@@ -76,7 +76,8 @@ class BatchSolver::Task : public solver::PointSource {
  private:
   using Clock = std::chrono::steady_clock;
 
-  /// Takes the next part of the batch, all of which a filter may leave out. False at the end.
+  /// Takes the next part of the batch. A filter may leave out all points of the part. Returns false
+  /// at the end of the batch.
   bool take_more() {
     std::unique_lock lock(solver_.mutex_);
     pass_on();
@@ -95,13 +96,13 @@ class BatchSolver::Task : public solver::PointSource {
   }
 
   BatchSolver& solver_;
-  OpenBatch& open_;  ///< not removed while a thread works on it
+  OpenBatch& open_;  ///< the batch is not removed while a thread works on it
   const Batch& batch_;
   std::uint64_t next_ = 0;                       ///< position
   std::uint64_t end_ = 0;                        ///< after the last position
-  std::vector<protocol::PointResult> results_;   ///< not passed on yet
-  std::vector<Batch::Range> left_out_;           ///< the same
-  Clock::time_point busy_since_ = Clock::now();  ///< start of the work not passed on yet
+  std::vector<protocol::PointResult> results_;   ///< not yet moved to the solver
+  std::vector<Batch::Range> left_out_;           ///< not yet moved to the solver
+  Clock::time_point busy_since_ = Clock::now();  ///< start of the work on these results
 };
 
 BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)

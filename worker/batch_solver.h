@@ -59,7 +59,7 @@ class BatchSolver {
     std::uint64_t given = 0;            ///< number of positions that threads have taken
     std::size_t solvers = 0;            ///< number of threads that work on the batch
     std::atomic<bool> dropped = false;  ///< written under the lock, read without it
-    bool unwanted = false;              ///< results are dropped too
+    bool unwanted = false;              ///< the results are dropped with the batch
   };
   using OpenBatches = std::list<OpenBatch>;
   class Task;  ///< the points that one thread solves, part by part
@@ -77,7 +77,7 @@ class BatchSolver {
   OpenBatches open_;                            ///< in the order of their numbers
   std::map<std::uint64_t, Progress> progress_;  ///< by the batch's number
   bool paused_ = false;
-  std::vector<std::jthread> threads_;  ///< last: they use the other members
+  std::vector<std::jthread> threads_;  ///< declared last: they use the other members
 };
 
 }  // namespace oblique::worker

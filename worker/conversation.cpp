@@ -14,7 +14,7 @@ namespace {
 constexpr std::int64_t kShortestInterval_ms = 10;
 constexpr std::int64_t kLongestInterval_ms = 600'000;
 
-/// Rounded to a tenth of a second.
+/// Formats a duration in seconds, rounded to a tenth.
 std::string seconds_of(std::int64_t duration_ms) {
   return fmt::format("{:.12g} s", std::round(static_cast<double>(duration_ms) / 100.0) / 10.0);
 }
@@ -300,7 +300,8 @@ void Conversation::on(const protocol::StudyDefinition& definition) {
     studies_[definition.study_id()] =
         std::make_shared<const protocol::PointTable>(definition.recipe());
   } catch (const solver::InputError& error) {
-    // The server accepted this recipe, so its release differs. Points must not fail for that.
+    // The server accepted this recipe, so its release differs from this one. The worker stops,
+    // because otherwise these points would fail.
     finish(1, fmt::format("study {} cannot be read: install the same release on server and "
                           "worker. {}",
                           definition.study_id(), error.what()));
@@ -497,7 +498,8 @@ void Conversation::begin_stop(const std::string& reason, int exit_code) {
   stop_reason_ = reason;
   stop_exit_code_ = exit_code;
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
-  // The server leases returned points again, so their results must have been sent.
+  // The server leases returned points again. So leases are returned only after all results were
+  // sent.
   if (!outbox_.has_waiting() && !held_.empty()) {
     protocol::WorkerMessage message;
     for (const auto& [number, held] : held_) {

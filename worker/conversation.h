@@ -22,7 +22,7 @@ namespace oblique::worker {
 
 /// Opens a new socket; closes the present one and drops its queued messages.
 struct Connect {
-  std::string reason;  ///< empty for the first one
+  std::string reason;  ///< empty for the first connection
 };
 struct Send {
   protocol::WorkerMessage message;
@@ -64,7 +64,7 @@ struct OutboxLimits {
   /// Solving pauses while this many results, or bytes of them, are not acknowledged.
   std::size_t unacknowledged_results = 50'000;
   std::size_t unacknowledged_bytes = std::size_t{64} << 20U;
-  std::size_t messages_on_their_way = 128;  ///< sent and not acknowledged; further ones wait
+  std::size_t messages_on_their_way = 128;  ///< more messages wait until some are acknowledged
 };
 
 /// Results that the server has not acknowledged, in the order of their sequence numbers.
@@ -78,7 +78,7 @@ class Outbox {
   void acknowledged(std::uint64_t sequence);
   void drop_study(std::uint64_t study_id);
   void drop_all();
-  /// Marks all results as not sent and as of no lease.
+  /// Marks all results as not sent, and removes their leases.
   void start_over();
 
   bool is_empty() const { return messages_.empty(); }
@@ -87,7 +87,7 @@ class Outbox {
     return results_ >= limits_.unacknowledged_results || bytes_ >= limits_.unacknowledged_bytes;
   }
   std::size_t results() const { return results_; }
-  /// Adds the lease of each message, 0 for none, to `leases`.
+  /// Adds the lease of each message to `leases`; 0 for a message without a lease.
   void add_leases(std::set<std::uint64_t>& leases) const;
 
  private:
@@ -102,7 +102,7 @@ class Outbox {
   std::deque<Message> messages_;
   std::size_t results_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t on_their_way_ = 0;  ///< number of messages, the oldest ones
+  std::size_t on_their_way_ = 0;  ///< number of sent messages, which are the oldest
   std::uint64_t next_sequence_ = 1;
 };
 
@@ -114,7 +114,7 @@ inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max
 /// When a worker stops by itself.
 struct ExitSettings {
   std::int64_t stop_ms = kNever_ms;       ///< by the clock of `now_ms`
-  std::string until = {};                 ///< the end of the process as the user wrote it
+  std::string until = {};                 ///< end of the process, as the user wrote it
   std::int64_t idle_exit_ms = kNever_ms;  ///< longest time without work
 };
 
@@ -129,7 +129,7 @@ struct Doubling {
 };
 
 struct ConversationSettings {
-  std::uint32_t batches_held = 2;  ///< one is being solved, one waits
+  std::uint32_t batches_held = 2;  ///< one batch is being solved, one waits
   OutboxLimits outbox = {};
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< a larger result has its own message
@@ -137,8 +137,8 @@ struct ConversationSettings {
   Doubling hello_timeout{3000, 12'000};
   Doubling backoff{50, 2000};           ///< pause between failures
   Doubling rejection{2000, 30'000};     ///< pause after the server rejects the socket
-  std::int64_t stop_timeout_ms = 2000;  ///< for the last results to be acknowledged
-  std::int64_t stop_repeats_ms = 1000;  ///< a second request to stop is ignored until then
+  std::int64_t stop_timeout_ms = 2000;  ///< time for the server to acknowledge the results
+  std::int64_t stop_repeats_ms = 1000;  ///< for this time a second request to stop is ignored
   ExitSettings exit = {};
 };
 
@@ -156,9 +156,10 @@ class Conversation {
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
   Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
-  /// For a message that could not be sent. The caller drops the later messages of these effects.
+  /// To be called when a message could not be sent. The caller drops the later messages of the same
+  /// effects.
   Effects on_send_failed(std::int64_t now_ms);
-  /// For a socket that the server rejected. Only a person can remove the cause.
+  /// To be called when the server has rejected the socket. Only a person can remove the cause.
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
   /// Must be called at `next_deadline_ms` or soon after.
   Effects on_time(std::int64_t now_ms);
@@ -205,7 +206,8 @@ class Conversation {
   void note(std::string text, bool is_warning = false);
   void send_heartbeat();
   void give_credit();
-  /// Sends waiting results, then requests batches: the server must not lease their points again.
+  /// Sends waiting results before it requests batches. Otherwise the server could lease the points
+  /// of these results again.
   void go_on();
   std::int64_t idle_exit_ms() const { return last_work_ms_ + settings_.exit.idle_exit_ms; }
   void exit_if_due();
@@ -229,9 +231,9 @@ class Conversation {
   std::int64_t rejected_ms_ = 0;  ///< last pause after a rejection; 0 after a welcome
   std::string rejection_;         ///< reason of the last rejection; empty after a welcome
   std::int64_t start_ms_ = 0;
-  std::int64_t last_work_ms_ = 0;  ///< when it last had a batch, a trace or results to deliver
+  std::int64_t last_work_ms_ = 0;  ///< when the worker last had a batch, trace or result
   bool was_welcomed_ = false;      ///< at least once
-  bool has_warned_ = false;        ///< since the last welcome, that no server answers
+  bool has_warned_ = false;        ///< true if it has warned that no server answers
   bool stopping_ = false;
   std::string stop_reason_;
   int stop_exit_code_ = 0;

@@ -58,7 +58,8 @@ std::string host_name() {
   return host.data();
 }
 
-/// Returns an error message for a name that terminals or messages cannot contain; else empty.
+/// Returns an error message if `name` has characters that terminals cannot show or is too long;
+/// else an empty text.
 std::string check_name(const std::string& name) {
   constexpr std::size_t kLongestName = 200;
   const bool is_plain =
@@ -68,8 +69,9 @@ std::string check_name(const std::string& name) {
              : "a name has 1 to 200 printable ASCII characters";
 }
 
-/// Seconds from now to `text`, negative for the past: a time in UTC, as 2026-11-22T05:00:00Z, or a
-/// duration, as 90m. Nothing for other text. `text` must not be empty.
+/// Returns the seconds from now to `text`, negative for the past. `text` is a time in UTC such as
+/// 2026-11-22T05:00:00Z or a duration such as 90m, and must not be empty. Returns nothing for other
+/// text.
 std::optional<double> seconds_until(const std::string& text) {
   std::tm parts{};
   const char* const end = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%SZ", &parts);
@@ -115,7 +117,7 @@ std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
 int run_worker(Options options) {
   SessionSettings& settings = options.session;
   oblique::protocol::Notifier notifier;
-  oblique::protocol::StopSignals stop;  // before any thread starts
+  oblique::protocol::StopSignals stop;  // must exist before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!oblique::protocol::stop_with_parent(options.parent)) {
     spdlog::warn("the parent process ended before this one started");
@@ -147,7 +149,7 @@ int run_worker(Options options) {
     notifier.stopping("stopping", kLongestEnd);
   });
   if (session.is_solving()) {
-    // The points under way cannot be interrupted, and their results are not needed.
+    // Ends the process, because points cannot be interrupted and their results are not needed.
     spdlog::default_logger()->flush();
     std::_Exit(exit_code);
   }

@@ -17,7 +17,7 @@ namespace oblique::worker {
 namespace {
 
 constexpr int kLinger_ms = 500;         ///< maximum time to send the goodbye
-constexpr int kMessagesAtATime = 1000;  ///< maximum number received in one turn of the loop
+constexpr int kMessagesAtATime = 1000;  ///< maximum number of messages in one turn of the loop
 
 std::int64_t now_ms() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);

@@ -20,7 +20,7 @@ namespace oblique::worker {
 /// Settings of the worker; help texts print the defaults from here.
 struct SessionSettings {
   std::string server = "tcp://127.0.0.1:7601";  ///< the server's address for workers
-  std::string name;                             ///< of the worker, in lists
+  std::string name;                             ///< name of the worker, in lists
   std::string host;                             ///< name of this machine, in lists
   std::size_t threads = 1;                      ///< number of solving threads
   /// Called several times a second with the state in words.
@@ -68,7 +68,7 @@ class Session {
   Conversation conversation_;
   std::optional<int> exit_code_;
   std::int64_t report_due_ms_ = 0;
-  BatchSolver solver_;  ///< these two last: their threads use the other members
+  BatchSolver solver_;  ///< declared last, with tracer_: their threads use other members
   TraceSolver tracer_;
 };
 

@@ -29,7 +29,7 @@ TraceRows::TraceRows(std::uint64_t every, std::size_t most_bytes)
 
 void TraceRows::add(const solver::TraceRow& row) {
   if (!rows_.empty() && !stays(rows_.back())) {
-    rows_.pop_back();  // the row was kept only as the last one
+    rows_.pop_back();  // the row was kept only because it was the last one
   }
   const bool falls = row.state == solver::kFalling;
   const bool is_always_kept = falls || solver::ends_phase(last_state_, row.state);
@@ -45,7 +45,7 @@ void TraceRows::add(const solver::TraceRow& row) {
     std::erase_if(rows_,
                   [this](const Row& kept) { return !stays(kept) && &kept != &rows_.back(); });
   }
-  if (rows_.size() > most_rows()) {  // counts the row only
+  if (rows_.size() > most_rows()) {  // the row is counted, but not kept
     is_too_long_ = true;
     rows_.pop_back();
   }

@@ -68,7 +68,7 @@ class TraceSolver {
 
   /// Declines the order if another one is being solved.
   void take(const protocol::TraceOrder& order);
-  /// Declines the order once its point is solved. Ignores unknown numbers.
+  /// Declines the order as soon as its point is solved. Ignores unknown numbers.
   void cancel(std::uint64_t trace_id);
   /// Leaves all orders so far without an answer.
   void drop_all();
@@ -88,7 +88,7 @@ class TraceSolver {
   bool is_cancelled_ = false;   ///< running_ will be declined
   bool is_dropped_ = false;     ///< running_ will not be answered
   std::vector<protocol::Trace> traces_;
-  std::jthread thread_;  ///< last: it uses the other members and is waited for
+  std::jthread thread_;  ///< declared last: the thread uses the other members
 };
 
 }  // namespace oblique::worker

@@ -37,7 +37,7 @@ PUBLISHED = {
 # Section 4.3: duration of the initial stick [ms].
 STICK_MS = {(1.0, 1.2, 1.0): 0.070, (1.0, 1.4, 1.0): 0.083, (1.0, 1.6, 1.0): 0.092}
 
-# %% Solves the time histories: the fall takes 0.1 s, each contact after it 1 ms
+# %% Solves the time histories. Solving the fall takes 0.1 s, and each contact then 1 ms
 points = sorted({point for group in GROUPS.values() for point in group})
 contacts = {point: oblique.trace(*point, preset="paper") for point in points}
 

@@ -10,8 +10,8 @@ export OBLIQUE_SERVER="${OBLIQUE_SERVER:-tcp://127.0.0.1:7600}"
 # Submitting the same study again continues it; with more points it grows.
 oblique submit --name "$study" --H 1 --mu 0.2:1.6:8 --e 0.8,1 --quiet
 
-# Waits for the end. Exit codes: 0 all points are solved, 1 some are not, 130 after Ctrl-C, when the
-# study continues.
+# Waits for the end. Exit codes: 0 all points are solved, 1 some are not, 130 after Ctrl-C. After
+# Ctrl-C the study continues.
 code=0
 oblique watch "$study" --quiet || code=$?
 if [ "$code" = 1 ]; then

@@ -15,7 +15,7 @@ if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
 endif()
 
 set(systemd "${CMAKE_CURRENT_LIST_DIR}/../systemd")
-# fill_in(TEMPLATE FOLDER NAME): installs a template with these folders and INSTANCE filled in.
+# fill_in(TEMPLATE FOLDER NAME): installs a template as FOLDER/NAME, with the variables filled in.
 function(fill_in template folder name)
   message(STATUS "Installing: $ENV{DESTDIR}${folder}/${name}")
   configure_file("${template}" "$ENV{DESTDIR}${folder}/${name}" @ONLY NO_SOURCE_PERMISSIONS NEWLINE_STYLE LF)

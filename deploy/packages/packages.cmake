@@ -53,7 +53,7 @@ set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME ${package_of_library})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION "libs\nMulti-Arch: same")
 # packing/debian_library.cmake sets the dependencies instead.
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS OFF)
-# A program built with the library runs with any release of the same SONAME that is not older.
+# A program built with the library runs with the same and any later release of the same SONAME.
 file(CONFIGURE OUTPUT debian/library/shlibs CONTENT "liboblique ${abi} ${package_of_library} (>= ${PROJECT_VERSION})\n")
 file(CONFIGURE OUTPUT debian/library/triggers CONTENT "activate-noawait ldconfig\n")
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${scripts}/library/shlibs ${scripts}/library/triggers)

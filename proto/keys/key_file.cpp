@@ -387,7 +387,7 @@ void change_authorized_keys(const std::string& path,
   AuthorizedKeys keys = exists(target) ? read_authorized_keys(path) : AuthorizedKeys();
   change(keys);
   const std::string draft = target + ".new";
-  ::unlink(draft.c_str());  // a process that was killed may have left it
+  ::unlink(draft.c_str());  // a killed process may have left this file
   write_new_file(draft, text_of(keys));
   // Keeps owner and mode, because a server of another user must still be able to read the file.
   const bool has_owner_and_mode =

@@ -118,19 +118,20 @@ void change_authorized_keys(const std::string& path,
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
 
-/// Returns `named`. If that is empty, returns the current folder or its subfolder `keys`. Throws
-/// solver::InputError if the folder has no server key.
+/// Returns `named`. If it is empty, returns the current folder, or its subfolder `keys` if only
+/// that has a server key. Throws solver::InputError if the folder has no server key.
 std::string find_key_folder(const std::string& named);
 
 /// Creates server.key, client.key, worker.key, reader.key, and the list with the last three keys.
 /// Creates a missing folder with mode 0700. Returns the server's public key. Throws
-/// std::runtime_error if a file cannot be created, or if one exists; then it creates none.
+/// std::runtime_error if a file cannot be created. If one of the files exists, throws it before
+/// creating any.
 CurveKey make_key_folder(const std::string& folder);
 
-/// Adds `public_key` to the list. If that is absent, creates a key pair, writes it to NAME.key and
-/// adds its public key. Throws solver::InputError if the list has the name or key already or the
-/// server's key cannot be read, and std::runtime_error if a file exists or cannot be written. After
-/// an error the list is unchanged.
+/// Adds `public_key` to the list. Without `public_key`, creates a key pair, writes it to NAME.key
+/// and adds its public key. Throws solver::InputError if the list has the name or key already, or
+/// if the server's key cannot be read. Throws std::runtime_error if a file exists or cannot be
+/// written. After an error the list is unchanged.
 AuthorizedKey add_key(const std::string& folder, const std::string& name, Role role,
                       const std::optional<CurveKey>& public_key);
 

@@ -12,7 +12,8 @@ namespace oblique::protocol {
 namespace {
 
 // Template of the completion script. NAME is replaced by the name of the program, and CASES by the
-// words to offer. A key of CASES is a command, or a command and a flag that takes a value.
+// branches of the `case` below. The pattern of a branch is a command, or a command and a flag that
+// takes a value. The branch lists the words to offer.
 constexpr std::string_view kBothShells = R"(_NAME_offers() {
   case $1 in
 CASES    *) return 1 ;;
@@ -113,8 +114,8 @@ std::string values_of(CLI::Option& option, const ValueWords& words) {
   return offers;
 }
 
-/// Returns the cases of a command and its subcommands. `path` is the command as typed after
-/// PROGRAM.
+/// Returns the branches of the script's `case` for a command and its subcommands. `path` is the
+/// command as typed after PROGRAM.
 std::string cases_of(CLI::App& command, const std::string& path, const ValueWords& words) {
   std::string cases;
   std::string offers;

@@ -19,8 +19,8 @@ inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kWrongUsage = 2;
 
-/// Makes an empty value of any option or argument of `app` and its commands wrong usage, because it
-/// may come from an unset shell variable. Must be called after all options were added.
+/// Refuses empty values of all options and arguments of `app` and its commands, because an empty
+/// value may come from an unset shell variable. Must be called after all options were added.
 void refuse_empty_values(CLI::App& app);
 
 /// Returns a check for numbers from `least` to `largest`. It refuses NaN.

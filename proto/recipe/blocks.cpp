@@ -293,7 +293,8 @@ void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
           twice == values.end() ? 0.0 : *twice);
 }
 
-/// Returns whether the key takes only whole numbers. It must take `from` and values up to `to`.
+/// Returns whether the key takes only whole numbers. The key must allow `from` and values up to
+/// `to`.
 bool takes_whole_numbers(const ParameterKey& key, double from, double to) {
   return !key.is_allowed(from + std::min(0.25, 0.5 * (to - from)));
 }
@@ -315,14 +316,16 @@ void check_range(const ParameterKey& key, const Axis& axis) {
   const RangeValues values(axis);
   if (axis.spacing() == SPACING_LOGARITHMIC) {
     check_positive(key, axis.from());
-    // Whole numbers with a constant ratio are rare, so the loop soon finds a wrong value.
+    // Few ranges with a constant ratio contain only whole numbers, so the loop soon finds a wrong
+    // value.
     const bool takes_whole = takes_whole_numbers(key, axis.from(), axis.to());
     for (std::uint64_t i = 0; takes_whole && i < axis.count(); ++i) {
       solver::check_value(key, values.at(i));
     }
     return;
   }
-  // A key allows an interval, or only its whole numbers. If the second value is allowed, all are.
+  // A key allows all numbers of an interval, or only the whole ones. So if the ends and the second
+  // value are allowed, all values are.
   solver::check_value(key, values.at(std::min<std::uint64_t>(1, axis.count() - 1)));
 }
 
@@ -476,7 +479,7 @@ bool needs_point_validation(const solver::ModelParameters& model, const Block& b
     check_reach(model, block);
     return false;
   } catch (const InputError&) {
-    return true;  // the point with the largest H may have a longer finger than the shortest
+    return true;  // the finger may be longer at the points with the largest H
   }
 }
 

@@ -17,9 +17,9 @@ namespace oblique::protocol {
 /// Maximum number of links of a model.
 inline constexpr std::size_t kMaxLinks = 64;
 
-/// Returns the number of a key: keys of a model come first, in the order of listings, then
-/// `length1`, `length2`, ..., and then H, mu and e. Throws InputError for an unknown key, with the
-/// nearest key and a list of all.
+/// Returns the number of a key. The model keys come first, in the order of solver::model_keys().
+/// Then come `length1`, `length2`, ..., and last H, mu and e. Throws InputError for an unknown key,
+/// with the nearest key and a list of all.
 std::size_t key_number(std::string_view name);
 /// Returns the key called `name`. Throws the errors of `key_number`.
 const solver::ParameterKey& axis_key(std::string_view name);
@@ -110,7 +110,7 @@ struct AxisLayout {
 /// Returns the axes of a checked block, in order.
 std::vector<AxisLayout> layout_of(const Block& block);
 
-/// Returns the model of the shortest finger in the block. Ignores expressions.
+/// Returns the model of the shortest finger in the block. Leaves out axes that are expressions.
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
 
 /// The tip of any finger can drop by this fraction of the finger's length. H must not exceed the

@@ -33,7 +33,7 @@ class Expression {
  private:
   class Parser;
   /// Replaces the top `arguments` values of the stack by the result of `compute`. Without
-  /// `compute`, pushes a constant or the value with that index.
+  /// `compute`, pushes a constant, or the value of the name with the index `pushed`.
   struct Step {
     double (*compute)(const double* x) = nullptr;
     std::size_t arguments = 0;

@@ -85,7 +85,8 @@ ModelParameters to_message(const solver::ModelParameters& model) {
 }
 
 solver::ModelParameters from_message_unchecked(const ModelParameters& message) {
-  // Checks these ranges before the conversion, because the struct has `int` and an enumeration.
+  // Checks these two fields before the conversion, because their values may not fit into the
+  // struct's members (`int` and an enumeration).
   solver::check_value(model_key("elements_per_link"), message.elements_per_link());
   solver::check_value(model_key("integrator"), message.integrator());
   solver::ModelParameters model;

@@ -32,7 +32,8 @@ std::string canonical_model(const solver::ModelParameters& model);
 /// Returns whether two blocks have the same axes, zip, sample and filter, as they are written.
 bool is_same_block(const Block& a, const Block& b);
 
-/// Returns the SHA-256, in hexadecimal digits, of model, request for estimated errors and blocks.
+/// Returns the SHA-256, in hexadecimal digits, of the recipe's model, blocks and request for
+/// estimated errors.
 std::string recipe_digest(const Recipe& recipe);
 
 /// Throws solver::InputError if the recipe does not fit into a frame for a worker.
@@ -61,7 +62,7 @@ Axis stepped_axis(const solver::ParameterKey& key, double from, double to, doubl
 
 Axis drawn_axis(const solver::ParameterKey& key, Distribution distribution);
 
-/// Makes an axis whose values an expression computes from others, such as "A^2 / (4 * pi)".
+/// Makes an axis whose values an expression computes from other keys, such as "A^2 / (4 * pi)".
 Axis expressed_axis(const solver::ParameterKey& key, std::string_view text);
 
 /// `kind` is random, lhs or sobol.

@@ -67,8 +67,8 @@ void in_block(const Recipe& recipe, std::size_t number, Act act) {
   }
 }
 
-/// Calls `act` with every number below `points`. If there are more than `most`, calls it with
-/// `tries` random numbers instead. Returns whether it used every number.
+/// Calls `act` with every number below `points`, or with `tries` random ones if `points` exceeds
+/// `most`. Returns whether `act` was called with every number.
 template <typename Act>
 bool for_each_or_some(std::uint64_t points, std::uint64_t most, std::uint64_t tries,
                       std::uint64_t seed, Act act) {
@@ -114,7 +114,7 @@ class PointTable::BlockPoints : public BlockPlace {
   const Block& definition() const { return *block_; }
   std::uint64_t points_per_model() const { return points / models; }
 
-  /// Returns the values of a point in the order of the axes, which the functions below need.
+  /// Returns the values of a point in the order of the axes. The functions below need these values.
   std::vector<double> values_at(std::uint64_t point) const {
     std::vector<double> values(sources_.size());
     for (std::size_t i = 0; i < sources_.size(); ++i) {
@@ -577,8 +577,8 @@ std::vector<std::uint64_t> some_points(const PointTable& table) {
 }
 
 /// Counts the different falls of the study. `some` contains all points or random ones. For random
-/// points the number is estimated (Good 1953): the share of the study's points whose fall occurs in
-/// `some` is about the share of points in `some` whose fall occurs there at least twice.
+/// points the number is estimated (Good 1953): a point of the study has a fall of `some` about as
+/// probably as a point of `some` shares its fall with another point of `some`.
 void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some, StudySize& size) {
   std::unordered_map<std::uint64_t, std::uint64_t> met;  // number of points by hash of their fall
   std::optional<std::uint64_t> model;  // model of the last point; `fall` is the hash of its fall

@@ -83,8 +83,8 @@ class PointTable {
 
   // The functions below throw std::out_of_range if the study has no such point, model or block.
 
-  /// Returns a point. A value that is not finite is replaced by 0, and a model value that is not
-  /// allowed by the base model's value.
+  /// Returns a point. Replaces a value that is not finite by 0, and a model value outside its
+  /// domain by the value of the base model.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
   /// Returns a point's values in the order of its block's axes. Expressions may be outside the
@@ -108,7 +108,7 @@ class PointTable {
   class BlockPoints;
   void add_block(const Block& block);
 
-  std::unique_ptr<Recipe> recipe_;  ///< its address does not change when the table moves
+  std::unique_ptr<Recipe> recipe_;  ///< on the heap: a moved table keeps the recipe's address
   solver::ModelParameters base_model_;
   std::vector<BlockPoints> blocks_;
   std::vector<Segment> base_segments_;     ///< runs of consecutive blocks without model axes
@@ -126,7 +126,7 @@ class PointTable {
 /// Returns whether `value` equals the finite number `own` within a relative difference of 1e-12.
 /// Only zero is close to zero.
 bool is_close(double value, double own);
-/// Returns whether all parameters are close. Whole numbers must be equal.
+/// Returns whether all parameters of two models are close. Whole numbers must be equal.
 bool is_close(const solver::ModelParameters& model, const solver::ModelParameters& own);
 /// Returns whether two canonical texts of models are close. `model` may be any text.
 bool is_close(std::string_view model, std::string_view own);

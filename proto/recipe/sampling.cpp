@@ -115,7 +115,7 @@ std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension) {
 }
 
 std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key) {
-  // One hash contains the flips of a tree with six levels, which has 63 nodes.
+  // One hash provides the random bits for a tree with six levels, which has 63 nodes.
   constexpr int kLevels = 6;
   std::uint64_t scrambled = 0;
   for (int depth = 0; depth < kSobolBits; depth += kLevels) {

@@ -26,12 +26,12 @@ std::uint64_t hashed(std::uint64_t key, std::uint64_t index);
 std::uint64_t sobol_bits(std::uint64_t index, std::uint32_t dimension);
 
 /// Returns `bits` after nested uniform scrambling (A. B. Owen, Randomly permuted (t,m,s)-nets and
-/// (t,s)-sequences, 1995). A bit drawn for the digits before a digit decides whether the digit is
-/// flipped, so every elementary interval of base 2 keeps its number of points.
+/// (t,s)-sequences, 1995). A random bit, which depends on all digits before a digit, decides
+/// whether the digit is flipped. So every elementary interval of base 2 keeps its number of points.
 std::uint64_t owen_scrambled(std::uint64_t bits, std::uint64_t key);
 
-/// The quantiles of a checked distribution. A normal distribution is truncated at the ends that it
-/// has.
+/// The quantiles of a checked distribution. A normal distribution is truncated at `from` and `to`
+/// if these are set.
 class Quantiles {
  public:
   explicit Quantiles(const protocol::Axis& axis);
@@ -39,8 +39,8 @@ class Quantiles {
   /// Returns the quantile for 0 < fraction < 1. It rises with `fraction` and is between the ends.
   double value_at(double fraction) const;
 
-  /// Returns the probability of the normal distribution between the ends; 1 for other kinds. A
-  /// subnormal result has too few digits to draw from.
+  /// Returns the probability of the normal distribution between the ends; 1 for other kinds. If the
+  /// result is subnormal, it has too few digits for sampling.
   double part_left() const { return below_to_ - below_from_; }
 
  private:

@@ -13,7 +13,8 @@ struct KeepAlive {
   int unacknowledged_ms = 20'000;
 };
 
-/// Number of bytes that encryption (CURVE's MESSAGE) adds to each frame, besides the maximum size.
+/// Number of bytes that encryption (CURVE's MESSAGE) adds to a frame. The maximum size of a frame
+/// does not include them.
 inline constexpr int kSealBytes = 33;
 
 }  // namespace oblique::protocol

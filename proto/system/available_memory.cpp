@@ -13,7 +13,7 @@ std::optional<std::uint64_t> memory_limit_bytes(const std::string& root, const s
     return limit;
   }
   std::string path = own.substr(at + 3, own.find('\n', at) - at - 3);
-  // In a container the path may be a path of the host that does not exist here. The root exists.
+  // In a container the path may be one of the host and not exist. The root exists.
   for (bool is_top = false; !is_top; path.resize(is_top ? 0 : path.rfind('/'))) {
     is_top = path.size() <= 1;
     std::uint64_t bytes = 0;

@@ -36,8 +36,8 @@ struct Table {
 
 Value value_of(const Cell& cell);
 
-/// Returns whether a chunk has the cells of as many rows as it states. Received chunks must be
-/// checked before any other use.
+/// Returns whether the cells of a chunk are complete and make the stated number of rows. Received
+/// chunks must be checked before any other use.
 bool is_sound(const QueryReply& chunk);
 
 /// Iterates over the rows of a sound chunk. The chunk must not change meanwhile.

@@ -15,8 +15,8 @@ inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024
 /// Maximum number of results in one message. Workers send at most 1,000.
 inline constexpr std::size_t kMaxResultsAMessage = 10'000;
 /// Maximum number of leases in a heartbeat. A worker has at most 50,000 unacknowledged results and
-/// 1,024 batches. This is checked after parsing, because a lease needs little more memory than its
-/// bytes.
+/// 1,024 batches. This is checked after parsing, because a parsed lease needs little more memory
+/// than an encoded one.
 inline constexpr int kMaxLeasesAHeartbeat = 65'536;
 
 /// Returns whether the frame is within the limits for workers; may be true for an invalid frame.

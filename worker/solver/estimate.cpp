@@ -14,16 +14,17 @@ namespace oblique::solver {
 namespace {
 
 /// Assumed orders of the mesh's error. Observed orders are higher: 3.5 to 5 for smooth outputs and
-/// 1.5 to 4 for rough ones. Errors of two meshes may differ by far less than either.
+/// 1.5 to 4 for rough ones. Lower orders are assumed, because the difference between two meshes may
+/// be far smaller than the error of either.
 constexpr int kSmoothOrder = 2;  ///< largest normal force, duration, slide, impulses
 constexpr int kRoughOrder = 1;   ///< outputs that depend on fast vibrations or single events
 constexpr int kRefinement = 2;
 
-/// (2 l/L)^4 with the longest element l and the length L of a bending wave as fast as the contact:
-/// the part of the mesh's error that does not follow the assumed order. The end of a beam struck on
-/// a spring k answers within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)); with a mass at
-/// the tip the contact is not faster than that mass on the spring. A wave of angular frequency w
-/// has the wavenumber (rho A w^2/(E I))^(1/4).
+/// The part of the mesh's error that does not follow the assumed order: (2 l/L)^4 with the longest
+/// element l and the length L of a bending wave as fast as the contact. A beam whose end is struck
+/// on a spring k responds within (k C)^(-2/3), C = sqrt(2)/((rho A)^(3/4) (E I)^(1/4)). With a mass
+/// m at the tip, the contact takes at least sqrt(m/k). A wave of angular frequency w has the
+/// wavenumber (rho A w^2/(E I))^(1/4).
 double unresolved_waves(const ModelParameters& model) {
   const double mass_per_length_kg_m = model.rho_kg_m3 * model.A_m2;
   const double bending_N_m2 = model.E_Pa * model.I_m4;
@@ -51,7 +52,7 @@ double factor(const ModelParameters& model, int order) {
 struct SolvedPoint {
   FingerPoint point;
   std::optional<CaseResult> result = {};
-  std::optional<Finger> companion = {};  ///< none without a coarser mesh or a fall on it
+  std::optional<Finger> companion = {};  ///< empty without a coarser mesh or without a fall on it
 };
 
 /// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` at the end of
@@ -115,14 +116,14 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   const double smooth = factor(model, kSmoothOrder);
   const double rough = factor(model, kRoughOrder);
   const double speed_m_s = std::hypot(result.vt_in_m_s, result.vn_in_m_s);
-  // Error of automatic steps. The error of steps that the user set is part of the difference.
+  // Error that automatic steps leave. If the user sets the step, the difference includes its error.
   const double step_error = model.dt_s == 0.0 ? model.tolerance : 0.0;
   const auto error_of = [&](double difference, double scale) -> std::optional<double> {
     const double error = std::abs(difference) / std::abs(scale);
     if (!std::isfinite(error)) {
       return std::nullopt;
     }
-    // Without a difference the output is exact, for example a force of 0 without friction.
+    // An output without a difference is exact, for example a force of 0 without friction.
     return error > 0.0 ? error + step_error : error;
   };
   const auto error = [&](double factor, double CaseResult::*output, double scale) {

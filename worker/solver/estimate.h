@@ -11,20 +11,22 @@ namespace oblique::solver {
 /// as long, where these are stable. Solving it takes about a quarter of the time, besides its fall.
 ModelParameters companion_model(const ModelParameters& model);
 
-/// Estimated errors of `result`, a point of `model`, from its differences to `companion`, the same
-/// point of `companion_model(model)` (accuracy.md, "Errors of single results"). Forces and impulses
-/// are relative to the normal ones, times to the duration, the slide to speed at touch times
-/// duration, speeds to the speed at touch. Absent where this scale is 0.
+/// Estimates the errors of `result`, the result of a point of `model`, from its differences to
+/// `companion`, the result of the same point of `companion_model(model)` (accuracy.md, "Errors of
+/// single results"). Errors of forces are relative to the largest normal force, of impulses to the
+/// normal impulse, of times to the duration, of the slide to speed at touch times duration, and of
+/// speeds to the speed at touch. An error is absent if its scale is 0.
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 
-/// The same, but solves the companion, with a fall from `falls`. Empty if there is no coarser mesh
-/// or the companion has no answer.
+/// Like estimated_errors(), but solves the companion, with a fall from `falls`. Empty if there is
+/// no coarser mesh or the companion has no answer.
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
                                   FallCache& falls);
 
 /// Like solve_points(), with estimated errors in each result whose companion has an answer. Solves
-/// up to 256 points, or points of one second, before their companions; outcomes follow in bursts.
+/// points for at most one second, at most 256, and then their companions. So outcomes come in
+/// bursts.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink);
 

@@ -23,9 +23,9 @@ struct FallOutcome {
   std::string error;
 };
 
-/// Falls that models share; the least recently used ones are removed. A fall that fails is kept as
-/// its error, so it fails once. May be used by several threads at once; the calling threads solve
-/// the falls.
+/// Falls that models share; the least recently used ones are removed. The error of a failed fall is
+/// kept, so the fall is not solved again. May be used by several threads at once; the calling
+/// threads solve the falls.
 class FallCache {
  public:
   using Solve = std::function<std::vector<FallOutcome>(std::span<const ModelParameters>)>;
@@ -35,8 +35,8 @@ class FallCache {
   explicit FallCache(std::size_t most_bytes = std::size_t{1} << 30, Solve solve = {});
 
   /// Returns the fall of `model`, or the error of a model outside its domain. Solves a missing fall
-  /// side by side with missing falls of `ahead`, as many as there are lanes. While another thread
-  /// solves the fall of `model`, solves only those of `ahead`, then waits.
+  /// side by side with missing falls of `ahead`, at most one fall per lane. If another thread is
+  /// solving the fall of `model`, solves only falls of `ahead`, then waits for that thread.
   FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
 
   /// The falls of all models; missing ones are solved side by side.
@@ -48,8 +48,8 @@ class FallCache {
  private:
   struct Entry {
     ModelParameters model;               ///< as returned by fall_model()
-    std::optional<FallOutcome> outcome;  ///< empty while it is being solved
-    bool is_used = false;                ///< false if it was only solved ahead
+    std::optional<FallOutcome> outcome;  ///< empty while the fall is being solved
+    bool is_used = false;                ///< false if the fall was only solved ahead
   };
   using Entries = std::list<Entry>;
 

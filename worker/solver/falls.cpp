@@ -24,7 +24,8 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// With fewer explicit steps in sqrt(2 length/g), stepping is faster than collocation.
+/// Number of explicit steps in the time sqrt(2 length/g) below which stepping is faster than
+/// collocation.
 constexpr double kFewSteps = 150'000.0;
 
 bool falls_by_collocation(const FallenChain& chain) {
@@ -75,7 +76,8 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b) {
 }
 
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains) {
-  using Kind = std::tuple<Integrator, bool, std::size_t, int>;  // links and elements a link last
+  // The integrator, true for collocation, and the numbers of links and of elements per link.
+  using Kind = std::tuple<Integrator, bool, std::size_t, int>;
   std::map<Kind, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const ModelParameters& model = chains[i]->model();
@@ -226,7 +228,7 @@ void FallCache::solve(const std::vector<Entries::iterator>& claimed,
   make_room();
 }
 
-/// Whether falls solved ahead, with those being solved, take less than half of the memory.
+/// Returns whether unused falls, including those being solved, take less than half of the memory.
 bool FallCache::has_room_ahead() const {
   std::size_t bytes = 0;
   for (const Entry& entry : entries_) {

@@ -25,7 +25,7 @@ class FallenChain {
   const Chain& chain() const { return chain_; }
   const std::shared_ptr<const Motion>& motion() const { return motion_; }
   double fall_step_s() const { return fall_step_s_; }
-  /// Only after the fall is solved.
+  /// May be called only after the fall is solved.
   const Fall& fall() const { return *fall_; }
   void set_fall(std::shared_ptr<const Fall> fall) { fall_ = std::move(fall); }
   FallProgress& fall_progress() const { return fall_progress_; }
@@ -46,7 +46,7 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b);
 /// chains. A fall has the same bits alone and beside others, even if others fail.
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains);
 
-/// The same for models. The outcome of a model outside its domain is an error.
+/// Solves the falls of models. The outcome of a model outside its domain is an error.
 std::vector<FallOutcome> solve_falls(std::span<const ModelParameters> models);
 
 }  // namespace oblique::solver

@@ -177,7 +177,8 @@ class PointSolver {
     return found->second;
   }
 
-  /// Whether the contact is the same as the last one up to its first turn.
+  /// Whether the contacts of this point and of the point begun last are equal until their first
+  /// compression ends.
   bool continues_group(const FingerPoint& point, const ContactSteps& steps) const {
     return last_ && last_->finger.parts() == point.finger.parts() &&
            last_->point.H_m == point.point.H_m && last_->point.mu == point.point.mu &&
@@ -207,7 +208,7 @@ class PointSolver {
   std::optional<FingerPoint> upcoming_;        ///< next point of the source
   bool has_ended_ = false;
   std::optional<FingerPoint> last_;  ///< the point begun last
-  double last_compression_s_ = 0.0;  ///< step of last_ in compression
+  double last_compression_s_ = 0.0;  ///< step in compression of the point begun last
   std::map<std::uint64_t, Begun> begun_;
   std::uint64_t next_number_ = 0;
   std::uint64_t group_ = 0;

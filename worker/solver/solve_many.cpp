@@ -31,8 +31,8 @@ class FingerSource {
   FingerSource(FallCache& falls, PointSource& source, const TakeOutcome& sink)
       : falls_(falls), source_(source), sink_(sink) {}
 
-  /// The next point; nothing at the end. Without `solves_falls` also nothing if the point's fall is
-  /// missing; the next call then returns this point.
+  /// Returns the next point; nothing at the end. Without `solves_falls`, also returns nothing if
+  /// the point's fall is missing; the next call then returns the point.
   std::optional<FingerPoint> next(bool solves_falls) {
     while (upcoming_ || (upcoming_ = source_.next())) {
       const std::uint64_t number = *upcoming_;
@@ -144,7 +144,8 @@ class Work {
       }
       points_.push_back({point, points_.size()});
     }
-    // Neighbours share a fall, a model, the state at touch, and the contact up to the first turn.
+    // Sorts points so that neighbours share the fall, the model, the state at touch, and the
+    // contact until its first compression ends.
     std::vector<std::uint64_t> fall_of_model;
     std::ranges::transform(models_, std::back_inserter(fall_of_model), fall_hash);
     const auto bits = [](double value) {
@@ -196,7 +197,7 @@ class Work {
     std::size_t number;  ///< index in the caller's list
   };
 
-  /// The points of one thread. Their numbers are indices of points_.
+  /// The points of one thread, numbered by their indices in points_.
   class Source : public PointSource {
    public:
     explicit Source(Work& work) : work_(work) {}
@@ -213,7 +214,7 @@ class Work {
       return work_.stopped_ || next_ == end_ ? std::nullopt : std::optional(next_++);
     }
     ModelPoint point(std::uint64_t number) override {
-      if (work_.stopped_) {  // do not solve the fall of this point
+      if (work_.stopped_) {  // the fall of this point must not be solved
         throw SolveError("stopped");
       }
       return work_.points_[number].point;

@@ -24,7 +24,8 @@ void check_asked(const char* key, double asked_s, double limit_s) {
   }
 }
 
-/// Step at the model's tolerance relative to the step at the default one, for a method of `order`.
+/// Ratio of the step at the model's tolerance to the step at the default tolerance, for a method of
+/// order `order`.
 double at_tolerance(const ModelParameters& model, double order) {
   return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
 }

@@ -14,7 +14,8 @@ namespace oblique::solver {
 ///
 /// with the highest frequency omega_max of the chain on its stiffest contact spring, and the
 /// frequency omega_tip of the tip's inertia on the spring of compression. Steps of
-/// generalized-alpha are fractions of the times of the motion itself, on any mesh.
+/// generalized-alpha do not depend on the mesh. They are fractions of characteristic times of the
+/// fall and the contact.
 class StepChoice {
  public:
   static constexpr double kErrorFactor = 0.045;
@@ -28,14 +29,14 @@ class StepChoice {
   /// us for the default model) and to sqrt(mass of the last link/k) in contact (0.1 us).
   static constexpr double kImplicitFallFraction = 1.0 / 40'000.0;
   static constexpr double kImplicitContactFraction = 1.0 / 1500.0;
-  /// Motion on the spring of restitution is 1/e* times faster than in compression. Below this e* it
-  /// is faster than the chain's own response, and steps shrink with e*.
+  /// Motion on the spring of restitution is 1/e* times faster than in compression. For e* below
+  /// this, the motion is faster than the chain's own response, and steps shrink with e*.
   static constexpr double kFastRestitution = 0.4;
   /// Steps in compression do not shrink below this e*: they only have to resolve the vibrations
   /// left by restitution.
   static constexpr double kFastestForCompression = 0.05;
-  /// No contact is shorter than this times sqrt(inertia of the tip/k): compression alone takes pi/2
-  /// times that.
+  /// No contact is shorter than this times sqrt(inertia of the tip/k). Its compression alone takes
+  /// pi/2 times this square root.
   static constexpr double kShortestContact = 0.1;
 
   /// `chain` must outlive this. Throws InputError when model.dt_fall_s is above its limit.

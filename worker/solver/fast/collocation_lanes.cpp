@@ -10,7 +10,8 @@ namespace oblique::solver {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// Corrections that no longer shrink count as rounding below this many times the allowed error.
+/// Corrections that no longer shrink are rounding errors if they are below this many times the
+/// allowed error.
 constexpr double kRoundingErrors = 1000.0;
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace oblique::solver {
 /// length. The bits of a lane do not depend on other lanes.
 class CollocationLanes {
  public:
-  /// For chains of the shape of `chain`. Each lane contains `chain` at rest.
+  /// Makes lanes for chains of the shape of `chain`. Each lane contains `chain` at rest.
   CollocationLanes(const LaneKernel& kernel, const Chain& chain);
 
   std::size_t lanes() const { return memory_.lanes(); }
@@ -42,8 +42,8 @@ class CollocationLanes {
   /// Accepts the last attempt in lanes whose step is_accepted; other lanes keep their states.
   void accept();
 
-  /// One coordinate of a lane: the step length of the last attempt, the values at its start and the
-  /// accelerations at its stages.
+  /// One coordinate of a lane in the last attempt: the step length, the values at the start of the
+  /// step and the accelerations at its stages.
   struct Coordinate {
     double h_s;
     double q;
@@ -58,11 +58,11 @@ class CollocationLanes {
   bool iterate(int iteration);
 
   LaneKernel kernel_;
-  std::size_t vector_;  ///< entries of one of positions, rates or accelerations
+  std::size_t vector_;  ///< number of positions; also of rates and of accelerations
   LaneMemory memory_;
   CollocationArrays arrays_;
   std::vector<double> total_kg_;
-  std::vector<double> correction_m_;  ///< of the last iteration
+  std::vector<double> correction_m_;  ///< size of each lane's last correction
   std::vector<Step> steps_;
 };
 

@@ -10,8 +10,8 @@ namespace oblique::solver {
 ///   q_i = q + c_i h v + h^2 sum_j (A A)_ij a_j,                at the nodes,
 ///   v' = v + h sum_j b_j a_j,  q' = q + h v + h^2 sum_j b_j (1 - c_j) a_j   at the end.
 ///
-/// A A = T diag(lambda^2) T^-1 is diagonal in complex numbers. Of each conjugate pair of
-/// eigenvalues one is kept, and vectors there are their real and imaginary parts in turn.
+/// A A = T diag(lambda^2) T^-1 is diagonal in complex numbers. One eigenvalue of each conjugate
+/// pair is kept. In this basis a vector consists of real and imaginary parts in turn.
 struct GaussCollocation {
   static constexpr std::size_t kStages = 8;  ///< chosen by work and precision (collocation.md)
   static constexpr std::size_t kPairs = kStages / 2;

@@ -74,7 +74,7 @@ struct LanePack {
   inline LanePack& operator-=(const LanePack& b) { return *this = *this - b; }
 };
 
-/// As in element_force.h; c and a are packs or numbers.
+/// plus_product() of element_force.h for packs; c and a may also be numbers.
 template <class C, class A, class Hardware, std::size_t count>
 inline auto plus_product(const C& c, const A& a, const LanePack<Hardware, count>& b) {
   using Pack = LanePack<Hardware, count>;
@@ -155,7 +155,7 @@ class CollocationStep {
         stage_q_(packs(arrays.stage_q)),
         stage_a_(packs(arrays.stage_a)) {}
 
-  // As in LaneKernel. The prediction has the mean acceleration of the previous step.
+  // The functions of LaneKernel. The prediction uses the mean acceleration of the previous step.
   inline void prepare() const;
   inline void iterate() const;
   inline void finish() const;

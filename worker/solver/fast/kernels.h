@@ -72,7 +72,7 @@ struct PefrlArrays {
   double* h_s;
   double* force;      ///< fn0, ft0, k_nn, k_tn, k_tt, x0, y0
   double* integrals;  ///< impulse_n, impulse_t, work_t
-  double* momenta;    ///< scratch for 4 entries a link
+  double* momenta;    ///< scratch memory, 4 entries per link
   double* reactions;  ///< square of the mean reaction of each link
 };
 
@@ -94,7 +94,7 @@ struct CollocationArrays {
 
 /// The steps compiled for one instruction set.
 struct LaneKernel {
-  std::string_view name;  ///< of the instruction set
+  std::string_view name;  ///< name of the instruction set
   std::size_t lanes;
   /// PEFRL for lanes that share the constants of a chain, and for lanes with different chains.
   void (*step_one_chain)(const ChainTables<double>& chain, const PefrlArrays& arrays);

@@ -18,10 +18,10 @@ using Clock = std::chrono::steady_clock;
 using Source = std::function<std::optional<ContactCase>()>;
 using Sink = std::function<void(Outcome&&)>;
 
-/// Maximum number of cases that share the contact up to the first turn.
+/// Maximum number of cases that share a contact until its first compression ends.
 constexpr std::size_t kLargestGroup = 16;
-/// The mean of a reaction over a shorter fraction of a step, as near an event, consists of rounding
-/// and is not used.
+/// In a shorter fraction of a step, as near an event, the mean of a reaction is mostly rounding
+/// error. It is not used.
 constexpr double kShortestSpan = 1e-3;
 
 /// A contact under way, with the other data for its result.
@@ -36,11 +36,11 @@ struct Lane {
   std::optional<Progress> progress;  ///< empty if the lane is idle
   ContactCase contact_case{};
   std::optional<ExplicitMotion> motion;
-  std::vector<ContactCase> followers;  ///< other cases of the group, until the first turn
+  std::vector<ContactCase> followers;  ///< rest of the group, until the first compression ends
   Clock::time_point started{};
 };
 
-/// A case that starts at the first turn of its group.
+/// A case that continues where the first compression of its group ended.
 struct Branch {
   ContactCase contact_case;
   Progress progress;
@@ -148,7 +148,7 @@ class ContactLanes {
     } catch (const SolveError& error) {
       end(lane, std::nullopt, error.what());
       for (const ContactCase& follower : std::exchange(slot.followers, {})) {
-        sink_({follower.number, std::nullopt, error.what()});  // fails in the same way
+        sink_({follower.number, std::nullopt, error.what()});  // would fail in the same way
       }
       return false;
     }

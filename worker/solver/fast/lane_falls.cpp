@@ -26,11 +26,12 @@ constexpr double kUnresolved = 1.5;
 constexpr double kFirstStep = 1.0 / 4000.0;
 /// Longest step, relative to sqrt(length/g): the chain turns by about 0.1 rad in it.
 constexpr double kLongestStep = 1.0 / 100.0;
-/// Allowed error of Newton's method in positions, relative to the length, per requested accuracy.
+/// Allowed error of positions in Newton's method, relative to the length and to the requested
+/// accuracy.
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 constexpr std::size_t kMaxSteps = 2'000'000;
-constexpr int kMaxHalvings = 30;  ///< of a step, in a row
+constexpr int kMaxHalvings = 30;  ///< consecutive halvings of one step
 
 /// Solves falls side by side; a lane whose fall is complete takes the next request. `Lanes` is
 /// SteppedLanes or CollocationFalls. An exception of start() or judge() becomes the fall's error.
@@ -242,13 +243,13 @@ class CollocationFall : public Fall {
     return within(number, step, at);
   }
 
-  /// The last step at whose start this member is at most `value`.
+  /// Returns the last step at whose start `member` is at most `value`.
   std::size_t step_from(double value, double Step::*member) const {
     const auto after = std::ranges::upper_bound(steps_, value, {}, member);
     return static_cast<std::size_t>(after - steps_.begin() - 1);
   }
 
-  /// Drops every second state if they need too much memory.
+  /// Drops every second state if the states need too much memory.
   void thin_states() {
     if (states_.size() * states_.front().size() <= kMaxOfStates) {
       return;

@@ -14,7 +14,8 @@ namespace oblique::solver {
 /// For a smaller tolerance explicit steps are faster than collocation (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 
-/// A fall to solve. The chain must outlive it, `progress` only its solution.
+/// A fall to solve. The chain must outlive the fall. `progress` is used only while the fall is
+/// solved.
 struct FallRequest {
   const Chain* chain;
   std::shared_ptr<const Motion> motion;  ///< explicit motion of the chain
@@ -29,7 +30,7 @@ std::vector<FallSolution> solve_by_steps(
     std::span<const FallRequest> requests,
     const LaneKernel& kernel = runnable_lane_kernels().front());
 
-/// The same by Gauss collocation.
+/// Like solve_by_steps(), but by Gauss collocation.
 std::vector<FallSolution> solve_by_collocation(
     std::span<const FallRequest> requests,
     const LaneKernel& kernel = runnable_lane_kernels().front());

@@ -14,7 +14,7 @@ namespace oblique::solver {
 /// PEFRL. The caller accepts or refuses the step of each lane.
 class LaneStepper {
  public:
-  /// For chains of the shape of `chain`. All lanes are idle at first.
+  /// Makes lanes for chains of the shape of `chain`. All lanes are idle at first.
   LaneStepper(const ChainTables<double>& chain, const LaneKernel& kernel);
 
   std::size_t lanes() const { return memory_.lanes(); }

@@ -71,7 +71,7 @@ struct ErrorEstimate {
   std::optional<double> slide;
   std::optional<double> impulse_n;
   std::optional<double> impulse_t;
-  std::optional<double> v_out;  ///< of the exit velocity as a vector
+  std::optional<double> v_out;  ///< error of the exit velocity as a vector
 
   bool operator==(const ErrorEstimate&) const = default;
 };

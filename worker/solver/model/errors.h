@@ -17,8 +17,8 @@ class InputError : public std::runtime_error {
     std::string text;                         ///< names the key, the value and the allowed range
     std::string key = {};                     ///< of the model, or "where" or "sample"
     std::string expression = {};              ///< the wrong expression
-    std::optional<std::size_t> block = {};    ///< number from 0, in a study of several
-    std::optional<std::uint64_t> point = {};  ///< number in the study
+    std::optional<std::size_t> block = {};    ///< block number from 0, if there are several
+    std::optional<std::uint64_t> point = {};  ///< point number in the study
     std::string place = {};                   ///< "study.toml:3:6" or "--mu 0.4"
   };
 

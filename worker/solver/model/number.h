@@ -7,8 +7,8 @@
 
 namespace oblique::solver {
 
-/// The shortest text that reads back as the same bits, for files: 0.1, 1e-06, -0, nan. Without an
-/// exponent from 0.0001 up to a million, and elsewhere if that is as short.
+/// Returns the shortest text that reads back as the same bits, for files: 0.1, 1e-06, -0, nan. From
+/// 0.0001 up to a million the text has no exponent. Elsewhere it has none if that is as short.
 std::string exact_number(double value);
 
 /// Longest text of `exact_number` [bytes].
@@ -16,8 +16,8 @@ inline constexpr std::size_t kLongestExactNumber = 32;
 /// Writes the text of `exact_number` to `at`, without a terminating zero, and returns its end.
 char* write_exact_number(double value, char* at);
 
-/// `value` rounded to `significant` digits (1 to 17), but to all digits before the point, without
-/// trailing zeros and never -0. With an exponent only below 0.0001 and from
+/// Returns `value` rounded to `significant` digits (1 to 17), without trailing zeros and never -0.
+/// Digits before the point are never rounded. The text has an exponent only below 0.0001 and from
 /// max(10^6, 10^`significant`) on.
 std::string readable_number(double value, int significant = 6);
 
@@ -28,7 +28,7 @@ std::string fixed_number(double value, int decimals);
 std::string signed_number(double value, int decimals);
 
 /// Parses a text written by `exact_number`, infinities and NaN included. Returns nothing for other
-/// text, also with spaces or a plus.
+/// text, such as one with spaces or a plus.
 std::optional<double> number_of(std::string_view text);
 
 }  // namespace oblique::solver

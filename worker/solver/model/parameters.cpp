@@ -277,7 +277,7 @@ bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
   ModelParameters one = model;
   ModelParameters other = model;
   key.set(one, 1.0);
-  key.set(other, 2.0);  // differs from 1 for every key, even if the key rounds
+  key.set(other, 2.0);  // differs from 1 even for a key that rounds its values
   return !(fall_model(one) == fall_model(other));
 }
 

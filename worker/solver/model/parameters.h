@@ -34,7 +34,7 @@ struct ModelParameters {
   double dt_s = 0.0;             ///< step in contact; 0: chosen by the tolerance
   double dt_fall_s = 0.0;        ///< step in the fall; 0: chosen for the integrator
   double tolerance = 1e-5;       ///< relative error that chosen steps leave in the outputs
-  double step_factor = 1.0;      ///< on the step in contact; 1 except in companion_model()
+  double step_factor = 1.0;      ///< factor on the step in contact; 1 except in companion_model()
 
   bool operator==(const ModelParameters&) const = default;
 };
@@ -42,8 +42,8 @@ struct ModelParameters {
 /// Smallest e*. Below it, k/e*^2 turns rounding of the tip's position into forces of newtons.
 inline constexpr double kSmallestRestitution = 1e-3;
 
-/// Range of a parameter of real fingers, besides 0 where it is allowed. Values outside are solved,
-/// with a note that they may be in another unit.
+/// Range of a parameter in real fingers. 0 is usual too where it is allowed. Values outside are
+/// solved, with a note that they may be in another unit.
 struct UsualRange {
   double from = 0.0;
   double to = std::numeric_limits<double>::infinity();
@@ -62,8 +62,9 @@ struct ParameterKey {
   UsualRange usual = {};
 };
 
-/// All numeric model keys in the order of listings. `links` gives every link the first of
-/// `lengths_m`, `length` sets all. The value of `integrator` is the number of the enumerator.
+/// All numeric model keys in the order of listings. Setting `links` gives every link the first
+/// length of `lengths_m`. Setting `length` gives every link that length. The value of `integrator`
+/// is the number of the enumerator.
 std::span<const ParameterKey> model_keys();
 
 /// Returns nullptr for an unknown name.
@@ -91,7 +92,7 @@ void validate_point(const ModelParameters& model, double H_m, double mu, double 
 std::string_view integrator_name(Integrator integrator);
 /// Throws InputError for an unknown name.
 Integrator integrator_named(std::string_view name);
-/// In the order of the enumerators.
+/// Returns the names in the order of the enumerators.
 std::span<const std::string_view> integrator_names();
 
 /// The model of a preset: `standard`, `paper`, `printed` or `converged`. Throws InputError for
@@ -105,9 +106,9 @@ struct MeshAccuracy {
   int elements_per_link;
   double forces_off;
   double duration_off;
-  double same_mode;  ///< points with the same major mode
+  double same_mode;  ///< share of points with the same major mode
 };
-/// In the order from coarse to fine meshes.
+/// Returns the accuracies from coarse to fine meshes.
 std::span<const MeshAccuracy> mesh_accuracies();
 
 /// `model` with the default of every parameter that does not affect its fall: k, eta2, dt, a

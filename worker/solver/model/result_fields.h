@@ -11,12 +11,13 @@
 
 namespace oblique::solver {
 
-/// A member of a CaseResult, or of a struct in one: a T, or a std::optional<T> that may be absent.
+/// A member of a CaseResult, or of a struct in it. Its type is T, or std::optional<T> if it may be
+/// absent.
 template <class T>
 struct Member {
   using Value = T;
-  const T* (*of)(const CaseResult& result);  ///< returns nullptr when absent
-  T& (*in)(CaseResult& result);              ///< creates the member; null if a list determines it
+  const T* (*of)(const CaseResult& result);  ///< null if the member is absent
+  T& (*in)(CaseResult& result);  ///< creates the member; null for a member that a list determines
   bool may_be_absent = false;
 };
 
@@ -32,7 +33,7 @@ struct ResultList {
   std::span<const std::string_view> members;  ///< names of an element's values
   /// Calls `take` with each element in order.
   void (*each)(const CaseResult& result, const TakeElement& take);
-  bool has_names = true;  ///< elements in JSON for users are objects, else arrays
+  bool has_names = true;  ///< true: elements in JSON for users are objects; false: arrays
 };
 
 /// An output that consists of the elements of a ResultList, or of one member of each.
@@ -56,10 +57,10 @@ struct ResultField {
   std::string_view group = {};     ///< object of `solve --json` that contains it; or empty
   std::string_view column = name;  ///< of the view `runs` and of queries
   std::string_view unit = {};      ///< SI; empty for pure numbers and texts
-  std::string_view meaning = {};   ///< one line, the sign included
+  std::string_view meaning = {};   ///< in one line; says which direction is positive
   std::variant<Member<double>, Member<std::int64_t>, Member<std::string>, ListPart> value;
   std::string_view shown_unit = unit;  ///< in tables for people
-  double shown_per_unit = 1.0;         ///< shown units in one `unit`
+  double shown_per_unit = 1.0;         ///< number of shown units in one `unit`
   SentWith sent_with = SentWith::kResult;
 };
 
@@ -67,7 +68,7 @@ struct ResultField {
 /// each type in this order.
 std::span<const ResultField> result_fields();
 
-/// All lists, in the order of rows.
+/// All lists, in the order of their columns.
 std::span<const ResultList* const> result_lists();
 
 /// Returns nullptr for an unknown column.

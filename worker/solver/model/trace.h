@@ -37,8 +37,8 @@ inline constexpr std::string_view kFalling = "falling";
 /// Rows of the fall: evenly spaced from release to touch, both included.
 inline constexpr int kFallRows = 121;
 
-/// Whether a turn between compression and restitution is at a row. `before` is the state of the
-/// previous row, empty at the first one.
+/// Whether a compression or restitution ended just before a row. `before` is the state of the
+/// previous row, empty for the first row.
 inline bool ends_phase(std::string_view before, std::string_view state) {
   return !before.empty() && before != kFalling && before.back() != state.back();
 }
@@ -48,7 +48,7 @@ struct Tracing {
   using Sink = std::function<void(const TraceRow&)>;
   Sink sink;  ///< called at every accepted step, from touch to separation; may be empty
   bool with_shape = false;  ///< fill TraceRow::nodes_m
-  bool with_fall = false;   ///< call `sink` at kFallRows instants of the fall before that
+  bool with_fall = false;   ///< first call `sink` at kFallRows instants of the fall
 };
 
 }  // namespace oblique::solver

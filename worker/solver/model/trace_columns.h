@@ -16,15 +16,16 @@ namespace oblique::solver {
 /// Vectors at links or nodes, numbered from 0 at the pin. Each vector has two columns, x and y.
 struct TraceVectors {
   std::vector<double> TraceRow::*values;
-  bool of_links;  ///< at links, else at nodes
+  bool of_links;  ///< true: at links; false: at nodes
 };
 
-/// A column of a trace, or the columns of all vectors. The name for vectors has the names of x and
-/// y, separated by a space; `{}` stands for the number of the link or node.
+/// A column of a trace, or the columns of vectors at all links or nodes. For vectors, `name`
+/// contains the names of x and y, separated by a space; `{}` stands for the number of the link or
+/// node.
 struct TraceColumn {
   std::string_view name;
   std::string_view unit;     ///< SI; empty for texts
-  std::string_view meaning;  ///< one line, the sign included
+  std::string_view meaning;  ///< in one line; says which direction is positive
   std::variant<double TraceRow::*, std::string TraceRow::*, TraceVectors> value;
 };
 

@@ -9,7 +9,7 @@
 
 #include "worker/solver/reference/chain_kernel.h"
 
-/// Banded matrices and their factors. By hand: Eigen has no banded factorisation.
+/// Banded matrices and their factors, which Eigen does not provide.
 namespace oblique::solver {
 
 /// Symmetric matrix of half-bandwidth 3, lower part by rows: at(i, d) is entry (i, i - d).
@@ -87,7 +87,7 @@ class BandedCholesky {
     });
   }
 
-  /// The rows, and kHalfBandwidth more of zeros.
+  /// Returns the rows of the factors, followed by kHalfBandwidth rows of zeros.
   const FactorRow<double>* data() const { return rows_.data(); }
 
  private:
@@ -170,7 +170,7 @@ class BandedLu {
   }
 
  private:
-  /// Columns right of the diagonal after row exchanges.
+  /// Number of columns right of the diagonal that row exchanges can fill.
   static constexpr std::size_t kReach = 2 * bandwidth;
 
   // Row i holds columns i - bandwidth .. i + 2 bandwidth, and room for one exchange.

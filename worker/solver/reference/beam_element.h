@@ -22,7 +22,7 @@ using ElementCoordinates = Eigen::Matrix<double, 2, 4>;
 /// c0, c1, c2 of one element side by side.
 using GradientCoefficients = Eigen::Matrix<double, 2, 3>;
 
-/// Computed from differences, so that a rigid shift causes no rounding.
+/// Computes c0, c1 and c2 from differences, so that a rigid shift causes no rounding.
 GradientCoefficients gradient_coefficients(const ElementCoordinates& q, double inverse_length);
 
 ElementConstants<double> element_constants(double length_m, double EA_N, double EI_N_m2,

@@ -208,7 +208,8 @@ double Chain::tip_inertia_kg() const {
 }
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
-  // The stiffness across the chain is smaller than along it, because it has no axial part.
+  // Stiffness along the chain gives the highest frequency, because stiffness across it has no axial
+  // part and is smaller.
   if (tip_stiffness_N_m == 0.0) {
     return std::sqrt(free_eigenvalue_);
   }

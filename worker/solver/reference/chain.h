@@ -64,7 +64,7 @@ class ElementChain {
 
  protected:
   struct Element {
-    std::array<Eigen::Index, 4> row;  ///< of p_i, s_i, p_j, s_j
+    std::array<Eigen::Index, 4> row;  ///< rows of p_i, s_i, p_j, s_j
     std::size_t link;
   };
 
@@ -130,7 +130,7 @@ class Chain : public ElementChain {
 
   double tip_mass_kg_;
   std::vector<LinkBalance<double>> balance_;
-  BandedMatrix mass_;  ///< of the free rows; row 0 is a unit row
+  BandedMatrix mass_;  ///< mass matrix of the free rows; row 0 is a unit row
   BandedCholesky mass_factor_;
   BandedMatrix along_;  ///< stiffness of the straight chain along itself: axial and bending
   double free_eigenvalue_ = 0.0;  ///< square of the highest frequency without springs at the tip

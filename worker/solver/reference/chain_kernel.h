@@ -102,8 +102,8 @@ class ForwardSubstitution {
 template <class Constant, class Real, class Take>
 inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
                             const Real* y, const Take& take) {
-  // Each turn solves three rows. A row overwrites the variables of the third row before it, which
-  // saves copies.
+  // Each iteration of the loop solves three rows. A row overwrites the variables of the third row
+  // before it, which saves copies.
   Real ax{}, ay{}, bx{}, by{}, cx{}, cy{};
   const auto next = [&](std::size_t row, Real& zx, Real& zy, const Real& x_1, const Real& y_1,
                         const Real& x_2, const Real& y_2) {
@@ -141,7 +141,7 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
     y[2 * row + 1] = y_row.y;
   };
   std::size_t row = 0;      // of the position at the element's left end
-  Vector pull_from_left{};  // contributions of the elements to the left to the rows of p and s
+  Vector pull_from_left{};  // sum of the forces of the elements on the left, on the row of p
   for (std::size_t link = 0; link < chain.links; ++link) {
     const ElementConstants<Constant>& constants = chain.link[link];
     Vector turn_from_left{Real{}, Real{} - chain.weight_N[row + 1]};
@@ -189,8 +189,8 @@ inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* 
   put_pair(acceleration, 0, PlanarVector<Real>{});
 }
 
-/// Sums the momentum of each link and all links outside it, from rates of all rows from the tip to
-/// the row after the pin.
+/// Sums the momentum of each link and all links outside it. Needs the rates of all rows in the
+/// order from the tip to the row after the pin.
 template <class Constant, class Real>
 class LinkMomenta {
  public:

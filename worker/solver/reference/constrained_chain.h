@@ -52,8 +52,8 @@ class ConstrainedChain : public ElementChain {
   /// The inner end of a link.
   struct Joint {
     Eigen::Index multiplier;
-    Eigen::Index position;  ///< of the link's first node
-    Eigen::Index before;    ///< of the last node of the link before; -1 at the pin
+    Eigen::Index position;  ///< position of the link's first node
+    Eigen::Index before;    ///< position of the previous link's last node; -1 at the pin
   };
   Eigen::Matrix4d mass_of(const Element& element) const {
     return mass_matrix(mass_per_length_, length_of(element));

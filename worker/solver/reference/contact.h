@@ -29,7 +29,7 @@ class Contact {
   /// contact outlasts kLongest_s or kMaxSteps steps.
   bool judge(const TipState& end, const ContactIntegrals<double>& integrals);
 
-  /// Whether the last accepted step ended at the first turn, before which e* has no effect.
+  /// Whether the first compression ended with the last accepted step. e* has no effect before that.
   bool is_at_first_turn() const { return record_.turned_once_at(t_s_); }
   /// A copy that continues with another e* and other steps in restitution. It has the same bits as
   /// a contact solved with them from touch. Requires is_at_first_turn().

@@ -88,8 +88,8 @@ std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
                                       const TipState& start, const TipState& end, double h_s,
                                       double vt_sign, bool fresh);
 
-/// Whether all Bernstein coefficients of the polynomial of guess_event() are negative, and so the
-/// polynomial in the whole step. For velocities they are multiplied by the step.
+/// Whether all Bernstein coefficients of the polynomial of guess_event() are negative. Then the
+/// polynomial is negative in the whole step. Coefficients of velocities are multiplied by the step.
 [[gnu::always_inline]] inline bool is_far(const ContactLaw& law, ContactEvent event,
                                           const TipState& start, const TipState& end, double h_s,
                                           double vt_sign) {
@@ -105,7 +105,7 @@ std::optional<EventGuess> guess_event(const ContactLaw& law, ContactEvent event,
   return path < h_s * (f0.value + 2.0 * f1.value) && path < h_s * (2.0 * f0.value + f1.value);
 }
 
-/// Whether all possible events are far, as in nearly all steps. Ten times faster than
+/// Whether is_far() holds for all possible events, as in nearly all steps. Ten times faster than
 /// guess_event().
 inline bool is_far_from_events(const ContactLaw& law, const TipState& start, const TipState& end,
                                double h_s, double vt_sign) {

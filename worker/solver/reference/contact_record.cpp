@@ -42,8 +42,8 @@ void ContactRecord::add_turn(const ContactLaw& before, const TipState& tip, doub
   turns_.push_back({t_s, before.fn_N(tip), 0.0});
 }
 
-/// Adds the slide of the last regime. Drops a regime without duration, such as a slip found by
-/// rounding where both forces vanish together.
+/// Adds the slide of the last regime. Drops a regime without duration, such as a slip that rounding
+/// causes where both forces vanish together.
 void ContactRecord::close_state(const ContactLaw& law, const TipState& tip, double t_s) {
   const double xP = law.xP_m(tip);
   if (!states_.back().stick) {
@@ -99,7 +99,7 @@ std::string ContactRecord::mode(const std::vector<bool>& survives) const {
   std::string text;
   std::string last;
   for (const State& state : states_) {
-    // Compression and restitution alternate at each remaining turn.
+    // Each turn that is left after merging ripples switches between compression and restitution.
     bool compression = true;
     for (std::size_t i = 0; i < turns_.size() && turns_[i].t_s <= state.t0_s; ++i) {
       compression = survives[i] ? !compression : compression;
@@ -150,7 +150,7 @@ CaseResult ContactRecord::result() const {
   return result;
 }
 
-/// Integral, up to its zero, of a function that is positive at the start and not at the end.
+/// Integral of a function that is positive at the start, from there to its zero in the step.
 double ContactMargin::Course::path_while_positive_m() const {
   const double a = rise0() / h_s;
   const double b = (rise1() - rise0()) / (2.0 * h_s);
@@ -167,7 +167,8 @@ ContactMargin::ContactMargin(const ContactLaw& law, const TipState& touch)
 }
 
 void ContactMargin::add_speed(double distance_m_s, std::string_view event) {
-  // Within a step a function is nearer to zero than at the ends by at most this part of the speed.
+  // Within a step a function may be nearer to zero than at both ends, by at most this part of the
+  // speed at touch.
   constexpr double kInside = 0.005;
   speed_m_s_.add(distance_m_s, event);
   near_m_s_ = -(speed_m_s_.distance + kInside * touch_speed_m_s_);
@@ -210,7 +211,7 @@ void ContactMargin::add_event(const ContactLaw& before, ContactEvent event, cons
   const bool is_stick = event == ContactEvent::kStick;
   const bool is_separation = event == ContactEvent::kSeparation;
   if (event == ContactEvent::kTangentialExtremum || (is_stick && before.mu() == 0.0)) {
-    return;  // no change of state; without friction P reverses
+    return;  // the state does not change: without friction P reverses
   }
   const double s = before.slip_direction();
   if (!is_turn && !is_separation && turn_.rises) {
@@ -269,7 +270,7 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
   ReactionPeak peak{last_.middle_s, std::sqrt(reaction.last_N2)};
   const double right = (std::sqrt(next_N2) - peak.force_N) / (next.middle_s - last_.middle_s);
   if (reaction.before_N2 < 0.0) {
-    // A reaction that falls from the start: linear extrapolation to the start.
+    // A reaction that falls from the start is extrapolated linearly to the start.
     const double back_s = right <= 0.0 ? 0.5 * last_.width_s : 0.0;
     peak = {last_.middle_s - back_s, peak.force_N - right * back_s};
   } else {
@@ -294,7 +295,7 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
 std::vector<ReactionPeak> ReactionPeaks::peaks() const {
   std::vector<ReactionPeak> peaks;
   for (const Reaction& reaction : reactions_) {
-    // A reaction that rises at the end: linear extrapolation to the end.
+    // A reaction that rises at the end is extrapolated linearly to the end.
     ReactionPeak end{last_.middle_s, std::sqrt(std::max(reaction.last_N2, 0.0))};
     if (reaction.before_N2 >= 0.0 && reaction.last_N2 >= reaction.before_N2) {
       const double rise_N_s =

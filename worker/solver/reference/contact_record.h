@@ -62,9 +62,9 @@ class ContactRecord {
   double work_t_J_ = 0.0;
 };
 
-/// Selects the turns peak, valley, ..., peak (forces in fn_N) that remain when ripples are merged.
-/// A ripple is a peak and a neighbouring valley less than 5 % of the largest peak apart; the
-/// shallowest is merged first.
+/// Selects the extrema of F_n (fn_N: peak, valley, ..., peak) that remain when ripples are merged.
+/// A ripple is a peak and a neighbouring valley whose forces differ by less than 5 % of the largest
+/// peak. The ripple with the smallest difference is merged first.
 std::vector<bool> without_ripples(const std::vector<double>& fn_N);
 
 /// The margin of a contact: its smallest distance from another order of events (theory.md).
@@ -133,15 +133,15 @@ class ContactMargin {
   double last_vn_m_s_ = 0.0;  ///< at the start of the last step
   double last_step_s_ = 1.0;
   bool has_turned_ = false;
-  bool stick_follows_slip_ = false;  ///< false if the present stick began at touch
-  double back_m_s_ = 0.0;            ///< maximum in stick of P's slip speed against its last slip
-  double left_side_ = 0.0;           ///< limit of the cone that F_t leaves in the next step, or 0
+  bool stick_follows_slip_ = false;     ///< false if the present stick began at touch
+  double back_m_s_ = 0.0;               ///< largest speed during stick at which P would slide back
+  double left_side_ = 0.0;              ///< direction of a slip that ended with the last step, or 0
   std::optional<double> slip_began_m_;  ///< position of P when the last slip began
 };
 
 inline void ContactMargin::add_step(const ContactLaw& law, const TipState& start,
                                     const TipState& end, double h_s) {
-  // Over a shorter time the mean of a velocity consists of rounding.
+  // In a shorter step the mean of a velocity is mostly rounding error.
   constexpr double kShortest_s = 1e-9;
   if (h_s < kShortest_s) {
     return;
@@ -171,8 +171,9 @@ class ReactionPeaks {
  public:
   explicit ReactionPeaks(std::size_t reactions) : reactions_(reactions) {}
 
-  /// Adds the next span: its end, its length (0 for an instant) and the squared magnitudes of the
-  /// means, `stride` numbers apart. A second span at the same time, after an event, is ignored.
+  /// Adds the next span: its end, its length (0 for an instant), and the squared magnitude of each
+  /// reaction's mean. These are `stride` numbers apart. A second span at the same time, after an
+  /// event, is ignored.
   void add(double end_s, double width_s, const double* squared_N2, std::size_t stride = 1) {
     const Span next{end_s - 0.5 * width_s, width_s};
     if (!(next.middle_s > last_.middle_s)) {

@@ -5,8 +5,8 @@
 /// set, so nothing here is shared with other translation units.
 namespace oblique::solver {
 
-/// c + a b. Multiply-adds are explicit, because compilers fuse different ones in each instance of a
-/// template. Packs have fused ones in fast/kernel_of.h.
+/// c + a b. Multiply-adds are explicit, because compilers would fuse different ones in each
+/// instance of a template. fast/kernel_of.h has fused ones for packs.
 template <class C, class A, class B>
 inline auto plus_product(const C& c, const A& a, const B& b) {
   return c + a * b;

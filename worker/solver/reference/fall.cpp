@@ -9,9 +9,9 @@
 namespace oblique::solver {
 namespace {
 
-/// When so many states are kept, every second one is dropped. A state has 32 bytes per row.
+/// When this many states are kept, every second one is dropped. A state has 32 bytes per row.
 constexpr std::size_t kMaxKept = 4096;
-constexpr double kMaxSteps = 1e9;  ///< in sqrt(2 length/g); more would take hours
+constexpr double kMaxSteps = 1e9;  ///< maximum in the time sqrt(2 length/g); more take hours
 
 }  // namespace
 

@@ -154,9 +154,10 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
 ContactIntegrals<double> GeneralizedAlphaMotion::integrals(const AffineContactForce<double>& force,
                                                            double h_s, const ChainState& from,
                                                            const ChainState& to) const {
-  // Hermite rules on values and derivatives at both ends: of higher order than the step.
+  // Integrates by Hermite rules from values and derivatives at both ends. The rules have a higher
+  // order than the step.
   struct End {
-    Eigen::Vector2d F, F_1, F_2;  // and derivatives in time
+    Eigen::Vector2d F, F_1, F_2;  // F_c and its derivatives in time
     double P, P_1;                // F_t V_t
   };
   const Eigen::Matrix2d K = contact_stiffness(force);

@@ -35,8 +35,8 @@ struct GeneralizedAlphaParameters {
 class GeneralizedAlphaMotion : public Motion {
  public:
   /// Newton's method stops when a correction moves no position by more than this part of an
-  /// element's length and no slope by more than this. The remaining error is about the square.
-  /// Steps in contact take one iteration.
+  /// element's length and no slope by more than this. The remaining error is about the square of
+  /// this. Steps in contact take one iteration.
   static constexpr double kNewtonTolerance = 1e-6;
   static constexpr int kMaxIterations = 20;
 

@@ -17,7 +17,8 @@ namespace {
 /// Maximum error of the energy balance, relative to the exchanged energy. A larger error shows that
 /// the step does not resolve the contact.
 constexpr double kWorstClosure = 1e-2;
-/// A smaller exchange, relative to the energies at touch, is lost in their rounding.
+/// Smallest exchanged energy, relative to the energies at touch. A smaller one is lost in the
+/// rounding of these.
 constexpr double kLeastExchanged = 1e-10;
 
 void balance(const Energies& in, const Energies& out, const ContactRecord& record,
