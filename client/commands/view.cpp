@@ -36,7 +36,7 @@ Links to the page stay valid only with the same --port.)";
 struct ViewFlags {
   RunSettings settings;
   int port = 0;
-  std::string server;  // value of --server, which is refused with the remedy
+  std::string server;  // value of --server; the command refuses it and names the remedy
 };
 
 /// Waits for a signal. Throws ProcessError if the server or the workers end.

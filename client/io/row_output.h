@@ -136,7 +136,7 @@ struct OutputSettings {
   /// True: a table omits columns that do not fit the terminal. False: it wraps the last column.
   bool may_leave_out = true;
   std::string way_to_all = "csv and json have all";  ///< advice on how to see omitted columns
-  /// For tables; further columns have their names as headings.
+  /// How tables show the columns. Columns beyond this list have their names as headings.
   std::vector<ShownColumn> shown = {};
   std::size_t width = 0;          ///< maximum length of a table line in characters; 0: no limit
   std::size_t first_rows = 1000;  ///< the first rows of a table, which set its column widths

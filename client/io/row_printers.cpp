@@ -288,7 +288,7 @@ class TablePrinter : public RowPrinter {
     double per_unit = 1.0;
     std::size_t width = 0;
     std::size_t before_point = 0;  // of numbers
-    std::size_t after_point = 0;   // characters from the point on
+    std::size_t after_point = 0;   // characters from the decimal point on
     bool has_numbers = false;
   };
   using Line = std::vector<Value>;

@@ -55,7 +55,7 @@ struct Curve {
   std::string name = {};  ///< entry in the key; empty: no entry
   std::vector<double> x = {};
   std::vector<double> y = {};
-  std::size_t stroke = 0;         ///< number of colour, dash pattern and mark
+  std::size_t stroke = 0;         ///< index of the colour, dash pattern and mark
   std::optional<double> by = {};  ///< value of the column Panel::by_name on this line
   /// Values that colour the points by the colour scale; if empty, `stroke` gives the colour.
   std::vector<double> colours = {};
@@ -203,7 +203,8 @@ struct Gathered {
 /// averaged; for text the most frequent value is taken. Cells without a row have no result.
 Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y);
 
-/// Marks cells without a result as excluded by the condition if `answer` (x, y) has a row for them.
+/// Marks a cell without a result as excluded by the condition if `answer` has a row with the x and
+/// y of the cell.
 void mark_filtered(Cells& cells, const Answer& answer);
 
 struct GatheredLines {

@@ -318,7 +318,7 @@ class FigureBuilder {
     const std::string remedy = fmt::format(
         "has fewer than two axes{}: use --lines, --scatter or --histogram, or name --x and --y",
         request_.at.empty() ? "" : " that --at leaves open");
-    // The axis of --y is not available for x.
+    // x must not take the axis that --y names.
     std::vector<ChosenAxis> taken;
     if (!request_.y.empty()) {
       taken.push_back(chosen_axis("--y", request_.y, shape_));

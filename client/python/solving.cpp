@@ -300,7 +300,7 @@ std::vector<double> lengths_of(const py::handle& value) {
 /// Reads a dict of numbers, texts (expressions), arrays of `points` values, and a list `lengths`.
 /// Throws InputError, with key, value and allowed range, for an unknown key (with the nearest known
 /// key), a wrong combination, and a value that is wrong for all points. A wrong value in an array
-/// becomes an error of its model, or an error of the point when that is solved.
+/// becomes the error of its model or, when the point is solved, the error of the point.
 GivenPoints points_of(const py::dict& keys, std::size_t points) {
   protocol::ModelInput model;
   std::map<std::size_t, protocol::Axis> keyed_axes;
@@ -337,10 +337,11 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
   }
   protocol::Block block = protocol::block_of(std::move(axes));
   block.set_zip(true);
-  std::map<std::vector<std::uint64_t>, std::size_t> known;  // models by the bits of their values
+  // The index of each model, by the bits of its values.
+  std::map<std::vector<std::uint64_t>, std::size_t> known;
   all.points.reserve(points);
   const auto add = [&](std::span<const double> values) {
-    std::vector<std::uint64_t> bits;  // unlike numbers, bits can be compared for NaN
+    std::vector<std::uint64_t> bits;  // not numbers, because NaN does not equal itself
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
       bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
     }

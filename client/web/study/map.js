@@ -276,7 +276,7 @@ export class MapCanvas {
 
   #frame([x, y, width, height], thick) {
     const context = this.top.getContext("2d");
-    // Draws the frame of a small cell at a distance from the cell.
+    // The frame of a small cell is larger than the cell.
     const grow = Math.max(0, 5 - Math.min(width, height));
     const line = (colour, lineWidth) => {
       context.strokeStyle = colour;
