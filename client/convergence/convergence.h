@@ -101,8 +101,8 @@ struct ContactChange {
 
 /// Returns the differences between the contacts on two levels: first additional compressions and
 /// restitutions, then the others, each in order of time. Events of one kind are matched in order.
-/// If one level has more events, the choice of those without a match makes the times of the matched
-/// ones agree best. Returns nothing if both have the same events and major peaks.
+/// If one level has more events, the match is chosen for which the times agree best. Returns
+/// nothing if both levels have the same events and major peaks.
 std::vector<ContactChange> changes_between(const solver::CaseResult& coarser,
                                            const solver::CaseResult& finer);
 
@@ -112,9 +112,9 @@ std::string described(const ContactChange& change);
 /// Returns "restitution", "stick" and so on.
 const char* name_of(ContactChange::Kind kind);
 
-/// Matches two lists of ascending times whose lengths differ by an even number. Leaves out pairs of
-/// neighbours in `longer` so that the sum of |differences| to `shorter` is minimal. Returns the
-/// first index of each such pair.
+/// Matches two lists of ascending times whose lengths differ by an even number. The surplus of
+/// `longer` is left out in pairs of neighbours so that the sum of |differences| to `shorter` is
+/// minimal. Returns the first index of each pair.
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter);
 

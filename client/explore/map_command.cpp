@@ -358,8 +358,8 @@ std::string islands_sentence(const FoundMap& map) {
       size(map.plane.axes[0]), size(map.plane.axes[1]));
 }
 
-/// The number of regions that tables and the picture show, with the letters A, B, ... The others
-/// are shown together.
+/// Returns the number of regions that tables and the picture show with letters A, B, ... All
+/// smaller regions are shown as one.
 std::size_t shown_regions(const FoundMap& map) {
   constexpr std::size_t kMaxShown = 16;
   const double least = std::pow(map.plane.grid.cells, 2) / 400.0;

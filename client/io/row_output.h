@@ -109,8 +109,8 @@ Format format_named(std::string_view name,
                     std::span<const std::string_view> allowed = format_names());
 
 /// Returns the format that --format names. Without --format, the ending of `file`, such as .csv,
-/// gives the format; standard output (`file` is empty) and files that are written directly have the
-/// format `usual`. Throws solver::InputError for other names and endings, and if the flag
+/// gives the format. Standard output (`file` is empty) and files that are written directly then
+/// have the format `usual`. Throws solver::InputError for other names and endings, and if the flag
 /// contradicts the ending.
 Format format_of_output(const std::string& flag, const std::string& file,
                         std::span<const std::string_view> allowed = format_names(),

@@ -213,9 +213,9 @@ struct GatheredLines {
   std::uint64_t most_at_a_place = 0;  ///< maximum number of rows with a value at one x of a line
 };
 
-/// Groups rows of x, y and optionally the value that distinguishes lines. Lines are sorted by x;
-/// several rows at one x are averaged. A line has a gap at each row without a value, and at each of
-/// `x_values` between its ends for which it has no row.
+/// Groups rows of x, y and, optionally, the value that distinguishes lines. Lines are sorted by x;
+/// several rows at one x are averaged. A line has a gap at each row without a value. It also has a
+/// gap at each of `x_values` between its ends for which it has no row.
 GatheredLines gathered_lines(const Answer& answer, const std::vector<double>& x_values);
 
 }  // namespace oblique::client::plot

@@ -165,8 +165,8 @@ Raster raster_of(const Panel& panel, std::size_t columns, std::size_t rows) {
   return raster;
 }
 
-/// Returns where a map shows the letter of each category: the middles of its largest squares, far
-/// apart from each other.
+/// Returns the places of the letters in a map. They are the middles of the largest squares of each
+/// category, far apart from each other.
 std::vector<std::size_t> letter_places(const Cells& cells, const Raster& raster) {
   const std::size_t columns = raster.columns;
   const auto kind_at = [&](std::size_t part) { return kind_of(cells, raster.cells[part]); };

@@ -205,8 +205,8 @@ std::string without_spaces(std::string_view text) {
              : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
 }
 
-/// Chooses lines instead of a map if two axes are open and one of them has few values: cells of a
-/// map would extend over values that the study does not have. Returns the axis along which the
+/// Chooses lines instead of a map if two axes are open and one of them has few values. Cells of a
+/// map would then extend over values that the study does not have. Returns the axis along which the
 /// lines run, or nullptr if a map is better.
 const StudyAxis* axis_of_few_lines(const std::vector<const StudyAxis*>& open) {
   constexpr std::size_t kFew = 3;

@@ -51,9 +51,9 @@ class ResultArrays {
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// Moves the outputs into a dict, under the names of `oblique solve --json`: an array for each
-  /// number, (texts, index of each point's text or -1) for each text, and `error`. Under `lists`,
-  /// each list has an array for each of its members, and the `offsets` of the points.
+  /// Moves the outputs into a dict with the names of `oblique solve --json`. A number becomes an
+  /// array. A text becomes (texts, index of each point's text or -1). `error` holds the errors.
+  /// Each list in `lists` has an array for each member, and the `offsets` of the points.
   py::dict dict();
 
  private:
@@ -234,9 +234,9 @@ std::vector<double> values_of(std::string_view key, const py::handle& array) {
   return numbers;
 }
 
-/// Adds a key. A single number of the model goes to `model`. A number of a point, a text
-/// (expression) or an array with one value per point goes to `axes`, which are ordered by
-/// key_number.
+/// Adds a key. A single number of a model key goes to `model`. Everything else goes to `axes`, by
+/// key_number: a number of a point key or link, a text (expression), or an array with one value per
+/// point.
 void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>& axes,
              const std::string& name, const py::handle& value) {
   const std::size_t number = protocol::key_number(name);

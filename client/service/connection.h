@@ -96,7 +96,7 @@ class Connection : public Source {
   protocol::WorkersReply workers();  ///< all workers
 
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
-  /// Waits as long as the server reports that it works on the trace. The server limits the time.
+  /// Waits while the server reports that it works on the trace. The server limits the time.
   protocol::TraceReply trace(protocol::TraceRequest trace);
   /// Changes the study called `study`. Renaming and deleting also need the number of the study.
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change,

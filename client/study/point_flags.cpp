@@ -85,8 +85,8 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
       has_spacing && parts[3] == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
 }
 
-/// Parses @FILE:COLUMN. @FILE without a column means the file's only column, or the column with the
-/// name of the key.
+/// Parses @FILE:COLUMN. Without a column, @FILE means the only column of the file, or else the
+/// column with the name of the key.
 protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, CsvFiles& files) {
   const auto colon = text.rfind(':');
   const CsvFile& file =
