@@ -82,7 +82,7 @@ int view(const ViewFlags& flags, Console& console) {
   protocol::StopSignals stop;
   try {
     EmbeddedService service(how, stop);
-    // Anyone with this address can change studies. It is therefore data on standard output,
+    // Anyone with this address can change studies. The address is data on standard output,
     // not a note, because notes may be logged.
     console.out() << service.page_url() << std::endl;
     console.note("Open this address in a browser; Ctrl-C ends it.");

@@ -106,8 +106,8 @@ struct Condition {
   std::vector<std::string> said;   ///< sentences about choices
 };
 
-/// Combines --where and --at. `drawn` holds the axes of the picture. With `fixes_others`, other axes
-/// that vary are fixed at their first values, unless --at or --where names them. Throws
+/// Combines --where and --at. `drawn` holds the axes of the picture. With `fixes_others`, other
+/// axes that vary are fixed at their first values, unless --at or --where names them. Throws
 /// solver::InputError for an --at with an unknown key, or with a value that the key does not have;
 /// the error gives the nearest.
 Condition condition_of(const PlotRequest& request, const StudyShape& shape,
