@@ -90,7 +90,7 @@ struct ContactChange {
     kRestitution,  ///< an additional restitution: V_n changes its sign twice more
     kStick,        ///< P comes to rest
     kSlip,         ///< P slides between two sticks
-    kRipple,       ///< not an event: a peak whose depth is near the limit for merging ripples
+    kRipple,       ///< not an event: a peak close to the limit between ripple and major peak
   };
   Kind kind;
   double t0_s;  ///< from touch
