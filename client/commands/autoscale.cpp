@@ -98,8 +98,8 @@ class SlurmJobs {
   std::string run(const std::string& program, const std::vector<std::string>& arguments,
                   bool may_stop) const {
     try {
-      // SQUEUE_PARTITION and similar variables are hidden from squeue, because they would hide jobs
-      // and this command would then submit too many.
+      // Hides SQUEUE_PARTITION and similar variables from squeue. With them squeue would omit jobs,
+      // and this command would submit too many.
       return output_of({.program = program, .arguments = arguments, .hidden_variables = "SQUEUE_"},
                        may_stop ? keep_waiting_ : nullptr);
     } catch (const ProgramNotFound&) {

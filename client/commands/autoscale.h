@@ -14,8 +14,9 @@ struct JobLimits {
   std::uint64_t points_per_job = 10'000;  ///< open points per job
 };
 
-/// Returns the number of open points that more workers would help to solve: those of running
-/// studies, except studies that wait for something else, such as disk space.
+/// Returns the number of open points that more workers would help to solve: the open points of
+/// running studies. Studies that wait for something other than workers, such as disk space, do not
+/// count.
 std::uint64_t open_points(const protocol::StatusReply& status);
 
 /// Returns the number of jobs to submit: one per `points_per_job` open points, rounded up and

@@ -38,8 +38,8 @@ constexpr const char* kExamples = R"(Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 130 stopped by Ctrl-C (128 + number of the signal).)";
 
-/// Wraps the description of a flag or command, which begins at `column`. Does not wrap examples
-/// with a remark, which have the same layout but begin with "oblique".
+/// Wraps the description of a flag or command, which begins at `column`. Leaves examples with a
+/// remark unchanged: they have the same layout, but begin with "oblique".
 std::string fitted_meaning(const std::string& line, std::size_t width, std::size_t column) {
   if (line.size() <= width || width <= column || line.size() <= column || line[column - 1] != ' ' ||
       line[column] == ' ' || line.starts_with("  oblique ")) {
@@ -96,8 +96,8 @@ int wrong_usage(Console& console, const CLI::App& command, const std::string& me
   return kWrongUsage;
 }
 
-/// Returns our name for a command that other programs have under this name and that is too
-/// different for the nearest-name search, or an empty text.
+/// Returns our name for a command that other programs call `command`, or an empty text. The table
+/// has only names that the search for the nearest name would not find.
 std::string other_name_of(const std::string& command) {
   const std::map<std::string_view, const char*> names{
       {"server", "oblique-server"}, {"worker", "oblique-worker"}, {"list", "oblique studies"}};
@@ -128,7 +128,7 @@ int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
-/// Exit code after the reader of the output has closed it: that of a program ended by SIGPIPE.
+/// Exit code if the reader of the output has closed it, as for a program killed by SIGPIPE.
 constexpr int kReaderGone = 128 + SIGPIPE;
 
 int carry_out(Console& console, const std::string& words, const Action& action) {
@@ -175,7 +175,7 @@ int execute(Console& console, CLI::App& app, const Action& action, const Verbosi
   return code;
 }
 
-/// For shell completion: values of flags that are column names.
+/// For shell completion: the column names, for each flag whose value names columns.
 protocol::ValueWords columns_of_values() {
   std::vector<std::string> names;
   for (const auto& column : server::all_columns()) {

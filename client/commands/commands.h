@@ -17,7 +17,8 @@ using protocol::kDone;
 using protocol::kFailed;
 using protocol::kWrongUsage;
 
-/// Carries out the parsed command and returns the exit code. Empty until a command is parsed.
+/// Carries out the parsed command and returns the exit code. An empty Action means that no command
+/// has been parsed.
 using Action = std::function<int(Console& console)>;
 
 /// A command with its flags. Their variables live as long as the command.
@@ -78,8 +79,8 @@ void add_map(CLI::App& app, Action& parsed);
 /// 128 + number of the signal that stopped the command.
 int run_command_line(Console& console, int argc, const char* const* argv);
 
-/// Wraps help text from CLI11 to `width` characters. Descriptions continue at `column`, other
-/// sentences at the start of the next line. Commands are not wrapped.
+/// Wraps help text from CLI11 to `width` characters. Wrapped descriptions continue at `column`,
+/// other sentences at the start of the next line. Example commands are not wrapped.
 std::string fitted_help(const std::string& help, std::size_t width, std::size_t column);
 
 }  // namespace oblique::client

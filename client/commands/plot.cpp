@@ -60,7 +60,7 @@ struct PictureFlags {
 struct PlotFlags {
   plot::PlotRequest request;
   std::optional<std::int64_t> point;  ///< point of the study
-  PointFlags values;                  ///< values of a point without a study
+  PointFlags values;                  ///< values of a point that belongs to no study
   std::string panel;                  ///< panel of a point; empty: all panels
   PictureFlags picture;
   PointSource source;

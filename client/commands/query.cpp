@@ -67,7 +67,8 @@ int query(const QueryFlags& flags, Console& console) {
     }
     return kDone;
   } catch (const solver::InputError&) {
-    // Throws std::runtime_error (exit code 1) for an unknown study; the query would exit with 2.
+    // For an unknown study, throws std::runtime_error (exit code 1). The error of the query would
+    // give exit code 2.
     (void)study_named(*source, flags.query.study);
     throw;
   }

@@ -46,9 +46,9 @@ std::vector<std::string> words_of_process(const std::string& pid) {
   return words;
 }
 
-/// Describes the process that has the database open: the oblique-server, or the `oblique` that
-/// started it, as "`oblique view` (process 4711)". Returns "another server" if it cannot find the
-/// process, for example because another user runs it.
+/// Describes the process that has the database open as "`oblique view` (process 4711)": the
+/// `oblique` that started the oblique-server, or else the server. Returns "another server" if the
+/// process cannot be found, for example because another user runs it.
 std::string user_of(const fs::path& database) try {
   for (const auto& process : fs::directory_iterator("/proc")) {
     const std::string pid = process.path().filename().string();

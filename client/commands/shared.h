@@ -38,7 +38,7 @@ void refuse_used_database(const std::filesystem::path& database);
 
 /// Destination and format of a long answer.
 struct OutputFlags {
-  std::string format;  // empty: by the ending of `file`, else a table
+  std::string format;  // empty: given by the ending of `file`, else a table
   std::string file;
   bool no_pager = false;
 };

@@ -44,8 +44,8 @@ TraceOutput trace_output(const std::string& where, bool json) {
   return {where == kStandardOutput ? "" : where, Format::kCsv, "--trace"};
 }
 
-/// Rejects lists. This check precedes that of the values, whose error would name only the largest
-/// value of a list.
+/// Rejects lists and ranges. Must come before the check of values, whose error would name only the
+/// largest value of a list.
 void check_one_value_each(const PointFlags& flags) {
   for (const auto& [key, text] : flags.axes) {
     const bool is_list = text.find(',') != std::string::npos && text.find('(') == std::string::npos;

@@ -69,8 +69,8 @@ struct Report {
   std::optional<StudyCost> cost;
 };
 
-/// Returns a point with its values. They come from the axes, not from the model, in which `length`
-/// and `length1` would not both have a value.
+/// Returns a point with its values. The values are those of the axes, because a model does not have
+/// a value for both `length` and `length1`.
 ShownPoint shown_point(const protocol::PointTable& table, const protocol::Block& block,
                        std::uint64_t number) {
   ShownPoint shown{number, {}};

@@ -40,8 +40,8 @@ double thread_seconds(std::size_t count, const std::function<void(std::size_t)>&
   return std::accumulate(each_s.begin(), each_s.end(), 0.0);
 }
 
-/// Returns each example and the points that follow it. Points that share falls with the example are
-/// among them, so they can be solved together as in a real study.
+/// Returns each example and up to seven points after it. Some of these share the fall of the
+/// example, so that points are solved together as in a real study.
 std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::PointTable& table,
                                      const protocol::StudySize& size) {
   constexpr std::uint64_t kNeighbours = 8;
@@ -124,7 +124,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
   const std::vector<FingerPoint> points = points_over(falls, table, size);
   std::vector<std::size_t> begun(cost.threads);
   const double contacts_s = thread_seconds(cost.threads, [&](std::size_t thread) {
-    // Time for a batch, as in a worker. A batch has at least one point per lane.
+    // A batch ends after this time, as in a worker, but has at least one point per lane.
     constexpr std::chrono::milliseconds kBatch{100};
     std::size_t& i = begun[thread];
     for (const auto start = Clock::now();

@@ -24,7 +24,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
 double time_s(const StudyCost& cost, const protocol::StudySize& size);
 
 /// Returns the estimate as "about 15 min on 2 threads". If falls take most of the time, adds which
-/// parameters share a fall and how many values of the sampled keys would shorten it.
+/// parameters share a fall, and the time with fewer values of the keys that change the fall.
 std::string time_in_words(const StudyCost& cost, const protocol::StudySize& size,
                           const protocol::Recipe& recipe);
 

@@ -26,7 +26,7 @@ struct TraceFlags {
   std::string study;
   std::int64_t point = 0;
   std::string out;     // empty: standard output
-  std::string format;  // empty: by the ending of the file, else CSV
+  std::string format;  // empty: given by the ending of the file, else CSV
   TraceOptions options;
   PointSource source;
 };

@@ -36,7 +36,7 @@ Links to the page stay valid only with the same --port.)";
 struct ViewFlags {
   RunSettings settings;
   int port = 0;
-  std::string server;  // value of --server, which is refused with the remedy
+  std::string server;  // value of --server; the command refuses it and names the remedy
 };
 
 /// Waits for a signal. Throws ProcessError if the server or the workers end.
@@ -82,8 +82,8 @@ int view(const ViewFlags& flags, Console& console) {
   protocol::StopSignals stop;
   try {
     EmbeddedService service(how, stop);
-    // With this address anyone can change studies. It is therefore printed as data, not as a note,
-    // which may be logged.
+    // Anyone with this address can change studies. The address is data on standard output,
+    // not a note, because notes may be logged.
     console.out() << service.page_url() << std::endl;
     console.note("Open this address in a browser; Ctrl-C ends it.");
     wait_for_the_end(console, service, stop);

@@ -77,7 +77,8 @@ protocol::Table full_table(const protocol::WorkersReply& reply) {
   return table;
 }
 
-/// Returns the main columns, in at most 100 characters. Omits a host that begins the worker's name.
+/// Returns the main columns, in at most 100 characters. If a worker's name begins with its host,
+/// the column `name` omits the host.
 protocol::Table table_for_people(const protocol::WorkersReply& reply) {
   constexpr double kMillisecondsASecond = 1000.0;
   const bool has_keys = std::any_of(reply.workers().begin(), reply.workers().end(),

@@ -40,8 +40,8 @@ Extrapolation monotone(double last, double before, double value, double highest_
           .error = std::abs(correction)};
 }
 
-// Returns the times of the turns between compression and restitution, which are those of the force
-// extrema: peak, valley, peak, ..., peak.
+// Returns the times at which compression changes to restitution or back. They are the extrema of
+// F_n: peak, valley, peak, ..., peak.
 std::vector<double> turn_times(const CaseResult& result) {
   std::vector<double> times;
   for (std::size_t i = 0; i + 1 < result.phases.size(); ++i) {
@@ -50,8 +50,8 @@ std::vector<double> turn_times(const CaseResult& result) {
   return times;
 }
 
-// Returns start and end of each stick in turn. Touch and separation count as ends if P sticks then,
-// so the number of times is even.
+// Returns start and end of each stick interval in order. If P sticks at touch or separation, that
+// instant counts, so the number of times is even.
 std::vector<double> stick_times(const CaseResult& result) {
   std::vector<double> times;
   for (const auto& stick : result.stick_intervals) {
@@ -69,9 +69,8 @@ void add_lone(std::vector<ContactChange>& changes, const std::vector<double>& co
   }
 }
 
-// Returns the states of `mode` ("sC sR sC sR") up to peak number `peak`, counted from 0. They end
-// with the first restitution after the peak, or with the last state before compression starts
-// again.
+// Returns the states of `mode` ("sC sR sC sR") up to peak number `peak`, counted from 0. With
+// `whole_restitution` they include the whole restitution after the peak, else only its first state.
 std::string mode_to_peak(const std::string& mode, std::size_t peak, bool whole_restitution) {
   std::size_t restitutions = 0;
   bool in_restitution = false;
@@ -100,7 +99,7 @@ OutputConvergence output_convergence(const Output& finest,
     });
     output.values.push_back(same == level.end() ? std::nullopt : std::optional(same->value));
   }
-  // Values of the finest levels that have the output, without a gap.
+  // Values of the levels after the last level that lacks the output.
   std::vector<double> tail;
   for (auto value = output.values.rbegin(); value != output.values.rend() && *value; ++value) {
     tail.insert(tail.begin(), **value);

@@ -86,11 +86,11 @@ Extrapolation extrapolate(std::span<const double> values, double highest_order, 
 /// event: for example, V_n touches zero and its sign may or may not change.
 struct ContactChange {
   enum class Kind {
-    kCompression,  ///< two turns: an additional compression
-    kRestitution,  ///< two turns: an additional restitution
+    kCompression,  ///< an additional compression: V_n changes its sign twice more
+    kRestitution,  ///< an additional restitution: V_n changes its sign twice more
     kStick,        ///< P comes to rest
     kSlip,         ///< P slides between two sticks
-    kRipple,       ///< not an event: a peak close to the depth below which ripples are merged
+    kRipple,       ///< not an event: a peak close to the limit between ripple and major peak
   };
   Kind kind;
   double t0_s;  ///< from touch
@@ -99,10 +99,10 @@ struct ContactChange {
   std::size_t finer_level = 0;  ///< index of the finer level
 };
 
-/// Returns the differences between the contacts on two levels, turns first, in order of time.
-/// Events of one kind are matched in order. If one level has more events, the events left out are
-/// those for which the times of the others agree best. Returns nothing if both have the same events
-/// and major peaks.
+/// Returns the differences between the contacts on two levels: first additional compressions and
+/// restitutions, then the others, each in order of time. Events of one kind are matched in order.
+/// If one level has more events, the match is chosen for which the times agree best. Returns
+/// nothing if both levels have the same events and major peaks.
 std::vector<ContactChange> changes_between(const solver::CaseResult& coarser,
                                            const solver::CaseResult& finer);
 
@@ -112,9 +112,9 @@ std::string described(const ContactChange& change);
 /// Returns "restitution", "stick" and so on.
 const char* name_of(ContactChange::Kind kind);
 
-/// Matches two lists of ascending times whose lengths differ by an even number. Leaves out pairs of
-/// neighbours in `longer` so that the sum of |differences| to `shorter` is minimal. Returns the
-/// first index of each such pair.
+/// Matches two lists of ascending times whose lengths differ by an even number. The surplus of
+/// `longer` is left out in pairs of neighbours so that the sum of |differences| to `shorter` is
+/// minimal. Returns the first index of each pair.
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter);
 
@@ -137,10 +137,10 @@ std::vector<Output> outputs_of(const solver::CaseResult& result);
 struct OutputConvergence {
   std::string name;
   double scale;  ///< scale of the finest level
-  /// One value per level, coarsest first; nothing if the states before it differ from those of the
-  /// finest level.
+  /// One value per level, coarsest first; nothing for a level whose states before the value differ
+  /// from those of the finest level.
   std::vector<std::optional<double>> values;
-  /// Extrapolation of the finest levels that have the value, without a gap.
+  /// Extrapolation of the values after the last missing one.
   Extrapolation extrapolation;
 
   double finest() const { return *values.back(); }
@@ -149,7 +149,8 @@ struct OutputConvergence {
 struct PointConvergence {
   std::vector<OutputConvergence> outputs;
   std::vector<ContactChange> changes;  ///< differences between neighbouring levels
-  /// Whether the finest three levels have one mode, ripples merged. Otherwise no limit is visible.
+  /// Whether the finest three levels have the same mode after ripples are merged. If not, no limit
+  /// is visible.
   bool has_one_mode = false;
 };
 

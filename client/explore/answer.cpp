@@ -39,7 +39,7 @@ std::string interval_text(const protocol::Value& from, const protocol::Value& to
   return from.index() == 0 && to.index() == 0 ? "" : fmt::format("{} to {}", text(from), text(to));
 }
 
-/// Makes one column of NAME_from and NAME_to.
+/// Merges the columns NAME_from and NAME_to into one column "95 %".
 protocol::Table with_intervals(protocol::Table table) {
   for (std::size_t i = 0; i < table.columns.size(); ++i) {
     if (table.columns[i].ends_with("_from")) {

@@ -12,7 +12,7 @@
 
 namespace oblique::client {
 
-/// Where the answer of an exploration goes.
+/// Format and file of the answer of an exploration.
 struct AnswerFlags {
   std::string format{"table"};  ///< of standard output
   std::string file;             ///< numbers or a picture, by its ending; empty: none
@@ -42,7 +42,7 @@ protocol::Value value_of(double number);
 void append_columns(protocol::Table& table, const std::string& name);
 /// Adds the values of these columns.
 void append_values(protocol::Row& row, const Estimate& estimate);
-/// A table as people read it.
+/// Formats a table for people.
 std::string text_of(const protocol::Table& table);
 
 }  // namespace oblique::client

@@ -36,8 +36,8 @@ void add_explore_flags(CLI::App& command, ExploreFlags& flags);
 std::string explored_name(const ExploreFlags& flags, std::string_view verb,
                           std::string_view settings);
 
-/// Returns what `work` returns. When a signal stops it (Interrupted), prints that the same command
-/// continues, and returns 128 plus the number of the signal.
+/// Returns what `work` returns. When a signal stops `work` (Interrupted), prints that the same
+/// command continues the exploration, and returns 128 plus the number of the signal.
 int run_exploration(Console& console, const std::function<int(protocol::StopSignals& stop)>& work);
 
 /// A study that grows round by round. Each round appends a block, which must be a deterministic
@@ -45,25 +45,25 @@ int run_exploration(Console& console, const std::function<int(protocol::StopSign
 /// continue an exploration that was stopped.
 class GrowingStudy {
  public:
-  /// Connects to the server, or starts one with workers, for as long as this object lives. Throws
-  /// solver::InputError when the study of that name exists with another model or with estimated
-  /// errors, std::runtime_error when the database is in use, and what EmbeddedService and
-  /// Connection throw.
+  /// Connects to the server, or starts a server with workers, for as long as this object lives.
+  /// Throws solver::InputError if the study `name` exists with another model or with estimated
+  /// errors, std::runtime_error if the database is in use, and the errors of EmbeddedService and
+  /// Connection.
   GrowingStudy(Console& console, const ExploreFlags& flags, std::string name,
                const solver::ModelParameters& model, protocol::StopSignals& stop);
   ~GrowingStudy();
 
-  /// Solves the points of `block`, unless they are stored. Returns one row per point, in their
-  /// order, with the values of `columns`: SQL over the view `runs`, for example "mode, fn_peak_N";
-  /// NULL where the point failed. `what` is shown with the progress. Throws solver::InputError when
-  /// the stored study has another block in this place, Interrupted when a signal stops it, and
-  /// std::runtime_error when another command cancels, renames or deletes the study.
+  /// Solves the points of `block`, unless they are stored. Returns one row per point, in the order
+  /// of the block. `columns` is SQL over the view `runs`, for example "mode, fn_peak_N"; the values
+  /// of failed points are NULL. `what` is shown with the progress. Throws solver::InputError if the
+  /// stored study has a different block for this round, Interrupted when a signal stops the call,
+  /// and std::runtime_error when another command cancels, renames or deletes the study.
   protocol::Table solve(const protocol::Block& block, const std::string& columns,
                         const std::string& what);
 
   const std::string& name() const { return name_; }
   std::size_t rounds() const { return static_cast<std::size_t>(recipe_.blocks_size()); }
-  std::uint64_t points() const { return points_; }  ///< of all rounds so far
+  std::uint64_t points() const { return points_; }  ///< number of points in all rounds so far
 
  private:
   bool keep_waiting();

@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-/// Maximum halvings of a cell whose rim has two crossings, and of a cell with more.
+/// Maximum halvings of a cell: the first if its rim has two crossings, the second if it has more.
 constexpr std::uint32_t kHalvings = 2;
 constexpr std::uint32_t kMaxHalvings = 4;
 
@@ -42,14 +42,15 @@ struct Cell {
   }
 };
 
-/// A border that crosses the rim of a cell. Its bracket is from a to b, counterclockwise.
+/// A place where a border crosses the rim of a cell. It lies between a and b (its bracket); b
+/// follows a counterclockwise.
 struct Crossing {
   LatticePoint a;
   LatticePoint b;
   int before;           ///< region at a
   int after;            ///< region at b
-  std::uint32_t width;  ///< of the bracket, in steps
-  double way;           ///< along the rim from the lower left corner to the middle, in steps
+  std::uint32_t width;  ///< distance from a to b, in steps of the lattice
+  double way;           ///< of the middle along the rim, from the lower left corner, in steps
 
   Position middle() const { return {(a.x + b.x) / 2.0, (a.y + b.y) / 2.0}; }
   BorderVertex vertex() const {
@@ -63,7 +64,7 @@ struct Crossing {
 struct Chord {
   Crossing a;
   Crossing b;
-  int region;  ///< to the right of the chord, in the part that earlier chords leave
+  int region;  ///< to the right of the chord, in the part that no earlier chord cuts off
   bool meets_others = false;
 };
 
@@ -141,7 +142,7 @@ class BorderSearch {
       request(corner);
     }
   }
-  /// Requests the middles of wide brackets, and halves the cell where borders need smaller ones.
+  /// Requests the middles of wide brackets. Halves the cell if its borders need smaller cells.
   /// Appends the cell, or its quarters, to `next` if it may change further, else to `cells_`.
   void refine(const Cell& cell, std::vector<Cell>& next) {
     const auto crossings = crossings_of(cell);
@@ -162,7 +163,7 @@ class BorderSearch {
     }
   }
 
-  /// Appends the crossings from a to b, two solved points; `way` belongs to a.
+  /// Appends the crossings from a to b, two solved points. `way` is the place of a along the rim.
   void walk(const LatticePoint& a, const LatticePoint& b, std::uint32_t width, double way,
             std::vector<Crossing>& crossings) const {
     const LatticePoint middle = middle_of(a, b);
@@ -194,20 +195,21 @@ class BorderSearch {
   MapGrid grid_;
   const RegionsOf& regions_of_;
   std::vector<Cell> cells_;
-  std::unordered_map<std::uint64_t, int> regions_;  ///< of the solved points by key
+  std::unordered_map<std::uint64_t, int> regions_;  ///< region of each solved point, by key_of
   std::set<std::uint64_t> requested_;               ///< keys of points
 };
 
-/// Marching squares for any number of regions. The crossings cut the rim into parts. The shortest
-/// part with one region on both sides is cut off by a chord, until there is none. The three
-/// borders or more that are left meet in a crossing that does not bound the shortest part, so that
-/// a sliver keeps both sides.
+/// Marching squares for any number of regions. The crossings cut the rim into parts. A chord cuts
+/// off the shortest part whose two neighbours have the same region, until there is none. If borders
+/// remain, there are at least three. They meet in a crossing that does not bound the shortest part,
+/// so that a sliver keeps both sides.
 Inside BorderSearch::inside_of(const Cell& cell) const {
   auto open = crossings_of(cell);
   Inside inside{.rest = open.empty() ? regions_.at(key_of(cell.low)) : open.back().after};
   while (!open.empty()) {
     const std::size_t n = open.size();
-    std::vector<std::pair<bool, double>> parts;  // behind crossing i: has different sides, length
+    // Of the part after crossing i: whether its neighbours have different regions; its length.
+    std::vector<std::pair<bool, double>> parts;
     for (std::size_t i = 0; i < n; ++i) {
       const Crossing& end = open[(i + 1) % n];
       const double way = end.way - open[i].way;
@@ -247,8 +249,8 @@ void BorderSearch::fill(std::vector<int>& raster, const Cell& cell, const Inside
   }
 }
 
-/// Joins chords to curves. A curve ends at a corner, or where no chord continues it. `neighbours`
-/// are the other ends of the chords of each vertex.
+/// Joins chords to curves. A curve ends at a corner, or where no chord continues it.
+/// `neighbours[i]` are the vertices that chords join to vertex i.
 std::vector<std::vector<std::size_t>> curves_of(std::vector<std::vector<std::size_t>> neighbours,
                                                 const std::set<std::size_t>& corners) {
   std::vector<std::vector<std::size_t>> curves;
@@ -309,7 +311,7 @@ Borders BorderSearch::borders() const {
 struct Sample {
   BorderVertex vertex;
   std::size_t curve;
-  std::vector<std::uint32_t> places = {};  ///< along the axis of the bracket, to be solved
+  std::vector<std::uint32_t> places = {};  ///< to be solved, along the axis of the bracket
   std::uint32_t low = 0;
   std::uint32_t high = 0;  ///< the border is between low and high; both 0: not found
 
@@ -317,7 +319,7 @@ struct Sample {
     return vertex.is_along_x ? LatticePoint{place, vertex.low.y}
                              : LatticePoint{vertex.low.x, place};
   }
-  /// Distance of a bracket from that of the vertex, in steps.
+  /// Distance of a bracket from the bracket of the vertex, in steps.
   double shift_of(std::uint32_t from, std::uint32_t to) const {
     return std::abs((from + (to - 1.0)) / 2.0 - vertex.place());
   }
@@ -332,7 +334,8 @@ struct Sample {
     }
     places.assign(around.begin(), around.end());
   }
-  /// Narrows the bracket, first to the nearest border of the same regions, and requests its middle.
+  /// Narrows the bracket and requests its middle. The first call chooses the border of the same
+  /// regions that is nearest to the vertex.
   void narrow(std::span<const int> regions_of_places) {
     if (places.size() == 1) {
       (regions_of_places[0] == vertex.from ? low : high) = places[0];
@@ -351,7 +354,8 @@ struct Sample {
   }
 };
 
-/// Solves the places of the samples and narrows their brackets, until there are no places.
+/// Solves the requested places of the samples and narrows their brackets, until no place is
+/// requested.
 void find_brackets(std::vector<Sample>& samples, const RegionsOf& regions_of) {
   while (true) {
     std::vector<LatticePoint> points;

@@ -18,9 +18,9 @@ struct LatticePoint {
 
 struct MapGrid {
   std::uint32_t cells = 64;    ///< along each axis
-  std::uint32_t halvings = 0;  ///< of a cell's side, until a bracket is short enough
+  std::uint32_t halvings = 0;  ///< halvings of a cell's side that make a bracket short enough
 
-  /// The grid whose brackets are at most `bracket` times an axis.
+  /// The grid whose brackets are at most `bracket` times the length of an axis.
   static MapGrid of(std::uint32_t cells, double bracket);
   std::uint32_t cell() const { return std::uint32_t{1} << halvings; }
   std::uint32_t last() const { return cells << halvings; }  ///< largest coordinate
@@ -62,11 +62,11 @@ Borders find_borders(const MapGrid& grid, const RegionsOf& regions_of);
 struct CurveShift {
   std::size_t checked = 0;  ///< vertices
   std::size_t lost = 0;     ///< vertices without such a border within 1/8 of the axis
-  double median = kNaN;     ///< shift of the other vertices, as a part of the axis
+  double median = kNaN;     ///< distance of the other vertices, as a fraction of the axis
   double largest = kNaN;    ///< likewise
 };
-/// The shifts of each curve, from one of `every` vertices and at least one. `regions_of` returns
-/// the regions in the other solution, for example on a finer mesh.
+/// Returns the shifts of each curve, measured at one of `every` vertices and at least at one.
+/// `regions_of` returns the regions in the other solution, for example on a finer mesh.
 std::vector<CurveShift> find_shifts(const MapGrid& grid, const Borders& borders, std::size_t every,
                                     const RegionsOf& regions_of);
 

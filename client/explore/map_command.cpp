@@ -67,9 +67,9 @@ struct MapAxis {
   std::uint32_t last;  ///< place of `to`
 
   /// Both ends are exact. Other values are multiples of 2^-50 times the largest power of two on the
-  /// axis, so that the middle of a bracket minus and plus half its width gives its ends to the bit.
+  /// axis. Therefore the ends of a bracket are exactly its middle minus and plus half its width.
   double value(std::uint32_t place) const {
-    constexpr int kBits = 50;  // a double has 53
+    constexpr int kBits = 50;  // fewer than the 53 bits of a double
     const double grain =
         std::ldexp(1.0, std::ilogb(std::max(std::abs(from), std::abs(to))) - kBits);
     const double value = from + (to - from) * place / last;
@@ -96,12 +96,12 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
   if (!(*to - *from > grid.last() * std::ldexp(std::max(std::abs(*from), std::abs(*to)), -50))) {
     throw InputError(fmt::format("{} {}: the ends must differ by more", flag, text));
   }
-  solver::check_value(key, axis.value(1));  // refuses keys of whole numbers
+  solver::check_value(key, axis.value(1));  // refuses keys whose values are integers
   return axis;
 }
 
-/// Returns SQL over the view `runs` for the region of a point, by --of: the value of a text column,
-/// or which side of the level a number is on. Throws InputError.
+/// Returns SQL over the view `runs` for the region of a point, as --of defines it: the value of a
+/// text column, or the side of the level on which a number lies. Throws InputError.
 std::string sql_of_region(const std::string& of) {
   const auto equals = of.rfind('=');
   const auto outputs = outputs_of_flag(of.substr(0, equals), true);
@@ -124,7 +124,7 @@ std::string sql_of_region(const std::string& of) {
   return fmt::format("CASE {} {} END", side(">"), side("<="));
 }
 
-/// Returns SQL for the region and, with --over, the number of a point. Throws InputError.
+/// Returns SQL for the region of a point and, with --over, for that output. Throws InputError.
 std::string columns_of(const MapFlags& flags) {
   std::string columns = sql_of_region(flags.of);
   if (!flags.over.empty()) {
@@ -145,7 +145,7 @@ struct MapPlane {
   std::array<MapAxis, 2> axes;  ///< x and y
   solver::ModelParameters model = {};
   std::vector<protocol::Axis> constants = {};  ///< axes of one value each, or expressions
-  std::string columns = {};                    ///< SQL for the region and the number of --over
+  std::string columns = {};                    ///< SQL for the region and the output of --over
 
   /// The settings that decide which points are solved.
   std::string settings(const MapFlags& flags) const {
@@ -205,7 +205,7 @@ void take_from_study(PointFlags& flags, const protocol::Recipe& stored, const st
   flags.lengths = fmt::format("{}", fmt::join(model.lengths_m, ","));
 }
 
-/// Throws InputError for a value that no point may have, also at the ends of the axes.
+/// Throws InputError for values that are not allowed, including the ends of the axes.
 MapPlane plane_of(Console& console, const MapFlags& flags) {
   // An unknown study is reported before other flags, as in all commands.
   const auto stored = flags.study.empty()
@@ -253,7 +253,7 @@ MapPlane plane_of(Console& console, const MapFlags& flags) {
 
 struct MapRegion {
   std::string name;
-  int first_number;    ///< by the order in which the regions were found
+  int first_number;    ///< number in the order in which regions were found
   double cells = 0.0;  ///< area in cells of the coarse grid, measured on the raster
 };
 
@@ -262,7 +262,7 @@ struct FoundMap {
   const MapFlags& flags;
   const MapPlane& plane;
   const GrowingStudy& study;
-  std::vector<MapRegion> regions = {};  ///< by number, the largest first
+  std::vector<MapRegion> regions = {};  ///< by region number, the largest region first
   Borders borders = {};
   std::vector<CurveShift> shifts = {};  ///< of each curve
   /// The values of --over at the points of the coarse grid, row by row from the lowest; NaN: none.
@@ -298,7 +298,7 @@ FoundMap find_map(const MapFlags& flags, const MapPlane& plane, GrowingStudy& st
   FoundMap map{flags, plane, study};
   std::map<std::string, int> numbers;
   const auto solve = [&](const std::vector<LatticePoint>& points, int elements_per_link) {
-    constexpr std::uint32_t kOtherRounds = 50;  // of halved cells and of the finer mesh
+    constexpr std::uint32_t kOtherRounds = 50;  // estimate for halved cells and the finer mesh
     const bool is_coarse_grid = study.rounds() == 0;
     const auto table = study.solve(plane.block_of(points, elements_per_link), plane.columns,
                                    fmt::format("round {} of about {}", study.rounds() + 1,
@@ -358,8 +358,8 @@ std::string islands_sentence(const FoundMap& map) {
       size(map.plane.axes[0]), size(map.plane.axes[1]));
 }
 
-/// The number of regions that tables and the picture show, with the letters A, B, ... The others
-/// are shown together.
+/// Returns the number of regions that tables and the picture show with letters A, B, ... All
+/// smaller regions are shown as one.
 std::size_t shown_regions(const FoundMap& map) {
   constexpr std::size_t kMaxShown = 16;
   const double least = std::pow(map.plane.grid.cells, 2) / 400.0;

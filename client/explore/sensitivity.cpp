@@ -23,12 +23,13 @@ std::uint64_t random_below(std::uint64_t limit, std::mt19937_64& random) {
   return ((random() >> 32U) * limit) >> 32U;
 }
 
-/// `numbers` as columns of `size`.
+/// Returns `numbers` as a matrix whose columns have `size` elements.
 Eigen::Map<const ArrayXXd> in_columns(std::span<const double> numbers, std::size_t size) {
   return {numbers.data(), static_cast<Index>(size), static_cast<Index>(numbers.size() / size)};
 }
 
-/// The first number, with the 2.5 % and 97.5 % percentiles of the others, of which NaN is left out.
+/// Returns the first number as an estimate, and as its interval the 2.5 % and 97.5 % percentiles of
+/// the other numbers. Ignores NaN among these.
 Estimate estimate_of(const ArrayXd& numbers) {
   Estimate estimate{.value = numbers[0]};
   std::vector<double> rising(numbers.begin() + 1, numbers.end());
@@ -42,9 +43,9 @@ Estimate estimate_of(const ArrayXd& numbers) {
   return estimate;
 }
 
-/// Measures that are functions of means, with bootstrap intervals. Each column of `terms` belongs
-/// to a row of the design. `measures_of(means, rows)` returns each measure of all inputs, measure
-/// after measure, from the means of the terms.
+/// Estimates measures that are functions of means, with bootstrap intervals. Each column of `terms`
+/// belongs to a row of the design. `measures_of(means, rows)` computes the measures from the means
+/// of the terms. It returns the first measure of all inputs, then the second, and so on.
 Sensitivity estimated(const std::vector<std::string>& measures, std::size_t inputs,
                       const ArrayXXd& terms, std::uint64_t seed, const auto& measures_of) {
   constexpr Index kReplicates = 1000;
@@ -150,7 +151,7 @@ Sensitivity morris_effects(std::span<const double> values, std::size_t inputs, s
     for (Index step = 0; step < d; ++step) {
       const ArrayXd change = points.col(step + 1) - points.col(step);
       Index input = 0;
-      change.abs().maxCoeff(&input);  // the one that changes
+      change.abs().maxCoeff(&input);  // the coordinate that changes
       effects(input, row) = (f(step + 1, row) - f(step, row)) / change[input];
     }
   }

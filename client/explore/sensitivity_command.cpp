@@ -50,7 +50,7 @@ struct SensitivityFlags {
   PointFlags points;
   std::string of{"fn_peak_N,duration_s"};
   std::string method{kMethods.front()};
-  std::uint64_t rows = 0;  ///< of the first round; 0: by the method
+  std::uint64_t rows = 0;  ///< rows of the first round; 0: default of the method
   double interval = 0.02;
   ExploreFlags explore;
   AnswerFlags answer;
@@ -59,9 +59,9 @@ struct SensitivityFlags {
 /// What the flags request, checked.
 struct SensitivityProblem {
   bool is_sobol;             ///< false: Morris' method
-  std::uint64_t first_rows;  ///< of the first round
+  std::uint64_t first_rows;  ///< number of rows in the first round
   std::vector<std::string> outputs;
-  protocol::Recipe sample = {};          ///< has the distributions of the inputs
+  protocol::Recipe sample = {};          ///< defines the distributions of the inputs
   std::vector<std::string> inputs = {};  ///< keys whose values are drawn
 };
 
@@ -84,7 +84,8 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
     throw error.fields().key == "sample" ? solver::InputError(kNothingDrawn) : error;
   }
   protocol::Block& block = *problem.sample.mutable_blocks(0);
-  block.mutable_sample()->set_kind(protocol::SAMPLE_SOBOL);  // a part of the name of the study
+  // The digest in the study's name depends on the kind.
+  block.mutable_sample()->set_kind(protocol::SAMPLE_SOBOL);
   for (const auto& axis : block.axes()) {
     if (protocol::is_drawn(axis)) {
       problem.inputs.push_back(axis.key());
@@ -131,7 +132,7 @@ protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t b
 
 /// Prints a note if falls need most of the time of the points of `block`.
 void note_falls(Console& console, const SensitivityProblem& problem, const protocol::Block& block) {
-  constexpr std::uint64_t kContactsPerFall = 100;  // in the time of a fall, or more, on any mesh
+  constexpr std::uint64_t kContactsPerFall = 100;  // a fall takes at least as long, on any mesh
   protocol::Recipe recipe = problem.sample;
   *recipe.mutable_blocks(0) = block;
   const auto size = protocol::size_of(protocol::PointTable(recipe));
@@ -149,7 +150,7 @@ void note_falls(Console& console, const SensitivityProblem& problem, const proto
 std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityProblem& problem,
                                           double interval, GrowingStudy& study) {
   constexpr std::uint64_t kMaxPoints = 500'000;
-  constexpr std::uint64_t kMaxValues = 1'900'000;  // that the definition of a study can list
+  constexpr std::uint64_t kMaxValues = 1'900'000;  // limit of the values in a study's definition
   const std::uint64_t max_points = std::min(kMaxPoints, kMaxValues / problem.inputs.size());
   std::vector<std::vector<double>> values(problem.outputs.size());
   std::string of_rounds;

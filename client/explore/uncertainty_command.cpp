@@ -49,7 +49,7 @@ struct UncertaintyFlags {
 /// The results of a study.
 struct SampledStudy {
   std::vector<std::string> outputs;
-  std::vector<double> shares;            ///< of the quantiles: 0.5 for the median
+  std::vector<double> shares;            ///< probabilities of the quantiles; 0.5 is the median
   std::vector<std::string> inputs = {};  ///< keys
   plot::Answer columns = {};             ///< inputs, then outputs; a row for each point
 };
@@ -99,8 +99,8 @@ std::vector<Statistic> statistics_of(const SampledStudy& study, std::size_t outp
   return statistics;
 }
 
-/// Adds the statistics of an output to the table, texts by falling probability, and lines at its
-/// quantiles to its histogram.
+/// Adds the statistics of an output to the table; probabilities of texts in falling order. Adds
+/// lines at the quantiles of numbers to the histogram.
 void add_output(const SampledStudy& study, std::size_t output, protocol::Table& table,
                 plot::Panel& histogram) {
   const std::size_t points = study.columns.front().numbers.size();
@@ -120,7 +120,7 @@ void add_output(const SampledStudy& study, std::size_t output, protocol::Table& 
     std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
       return std::get<double>(a[2]) > std::get<double>(b[2]);
     });
-    histogram.y.label.clear();  // the title names it
+    histogram.y.label.clear();  // the title names the output
   } else {
     for (std::size_t i = 0; i < study.shares.size(); ++i) {
       const double value = statistics[2 + i].second.value;

@@ -46,7 +46,8 @@ std::string text_in(const Descriptor& file, std::size_t from) {
   return text;
 }
 
-/// Returns our environment without variables that begin with `hidden`, or all if it is empty.
+/// Returns our environment without the variables whose names begin with `hidden`. If `hidden` is
+/// empty, returns all variables.
 std::vector<char*> environment_without(const std::string& hidden) {
   std::vector<char*> variables;
   for (char** variable = environ; *variable != nullptr; ++variable) {

@@ -38,9 +38,9 @@ struct Pipe {
 struct ChildSettings {
   std::filesystem::path program;       ///< a name without a slash is searched for in PATH
   std::vector<std::string> arguments;  ///< arguments after the program's name
-  bool show_errors = false;            ///< shows standard error on ours; otherwise keeps it
+  bool show_errors = false;            ///< sends standard error to ours; otherwise keeps the text
   int handed_over = -1;                ///< descriptor that becomes the child's kHandedOver
-  bool keep_output = false;            ///< keeps standard output apart from standard error
+  bool keep_output = false;            ///< keeps standard output separately from standard error
   std::string hidden_variables{};      ///< prefix of environment variables to hide; empty: none
   std::optional<std::string> input{};  ///< text for standard input; nothing: empty input
   bool stays_in_our_group = false;     ///< the child receives our group's signals

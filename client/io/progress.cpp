@@ -73,7 +73,8 @@ std::string progress_line(const ProgressState& state) {
 }
 
 void Progress::update(ProgressState state) {
-  // The rate is averaged over this time: steady, but following workers that come and go.
+  // The rate is an average over this time: long enough for a steady rate, and short enough to show
+  // when workers come or go.
   constexpr double kWindow_s = 10.0;
   const double now_s = state.elapsed_s;
   window_.emplace_back(now_s, state.completed);

@@ -72,7 +72,7 @@ struct FilePlace {
 };
 
 FilePlace file_place(const std::string& path, std::string_view flag) {
-  constexpr int kMaxLinks = 40;  // Linux follows as many links
+  constexpr int kMaxLinks = 40;  // the maximum that Linux follows
   FilePlace place{path};
   std::error_code ignored;
   for (int links = 0; fs::is_symlink(fs::symlink_status(place.path, ignored)); ++links) {
@@ -80,7 +80,8 @@ FilePlace file_place(const std::string& path, std::string_view flag) {
       refuse(flag, path, ELOOP);
     }
     const fs::path link = fs::absolute(place.path);
-    // Links in /proc, as behind /dev/stdout, refer to open files, whose names do not matter.
+    // Links in /proc, such as the target of /dev/stdout, refer to open files. Output is written
+    // directly to the open file.
     if (fs::weakly_canonical(link.parent_path(), ignored).string().starts_with("/proc/")) {
       place.is_in_place = true;
       return place;

@@ -109,8 +109,8 @@ Format format_named(std::string_view name,
                     std::span<const std::string_view> allowed = format_names());
 
 /// Returns the format that --format names. Without --format, the ending of `file`, such as .csv,
-/// gives the format; standard output (`file` is empty) and files that are written directly have the
-/// format `usual`. Throws solver::InputError for other names and endings, and if the flag
+/// gives the format. Standard output (`file` is empty) and files that are written directly then
+/// have the format `usual`. Throws solver::InputError for other names and endings, and if the flag
 /// contradicts the ending.
 Format format_of_output(const std::string& flag, const std::string& file,
                         std::span<const std::string_view> allowed = format_names(),
@@ -136,7 +136,7 @@ struct OutputSettings {
   /// True: a table omits columns that do not fit the terminal. False: it wraps the last column.
   bool may_leave_out = true;
   std::string way_to_all = "csv and json have all";  ///< advice on how to see omitted columns
-  /// For tables; further columns have their names as headings.
+  /// How tables show the columns. Columns beyond this list have their names as headings.
   std::vector<ShownColumn> shown = {};
   std::size_t width = 0;          ///< maximum length of a table line in characters; 0: no limit
   std::size_t first_rows = 1000;  ///< the first rows of a table, which set its column widths

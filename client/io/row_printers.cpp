@@ -288,7 +288,7 @@ class TablePrinter : public RowPrinter {
     double per_unit = 1.0;
     std::size_t width = 0;
     std::size_t before_point = 0;  // of numbers
-    std::size_t after_point = 0;   // characters from the point on
+    std::size_t after_point = 0;   // characters from the decimal point on
     bool has_numbers = false;
   };
   using Line = std::vector<Value>;
@@ -385,8 +385,8 @@ std::size_t TablePrinter::least_width(const Column& column) const {
                               : std::max(kShortestText, width_of(column.heading));
 }
 
-/// Makes lines fit the width. Wraps sentences in the last column if all columns must be shown;
-/// otherwise shortens the widest texts, then omits columns from the right, but never the first.
+/// Makes lines fit the width. If all columns must be shown, wraps sentences in the last column.
+/// Otherwise shortens the widest texts, then omits columns from the right, but never the first.
 void TablePrinter::fit() {
   while (settings_.width > 0 && line_width() > settings_.width) {
     Column* widest = nullptr;

@@ -52,8 +52,8 @@ PublishedCase case_of(const toml::table& table) {
           table["read"].value<std::string>().value()};
 }
 
-// Rows of the database do not contain F_n at valleys, so the turns of a ripple are unknown. Only
-// the phases up to the peak before the first ripple are used.
+// Rows of the database do not contain F_n at valleys. Therefore the phases that belong to a ripple
+// are unknown, and only the phases up to the peak before the first ripple are used.
 CaseNumbers case_of_row(const protocol::Row& row) {
   CaseNumbers own;
   own.mode = std::get<std::string>(row[7]);

@@ -74,7 +74,8 @@ struct Difference {
   std::optional<double> percent() const;
 };
 
-/// Returns all published numbers that count, each with ours; `own` has one entry per case.
+/// Returns all published numbers except misprints, each with our number; `own` has one entry per
+/// case.
 std::vector<Difference> compare(const PublishedTable& table, const OwnCases& own);
 
 /// Root mean square and maximum size of the differences [%].

@@ -124,7 +124,7 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
     longest_s = std::max(longest_s, t_s);
   }
   add_if_any(panel, std::move(published));
-  panel.x = plot::time_axis(1.03 * longest_s);  // the margin includes marks at the end
+  panel.x = plot::time_axis(1.03 * longest_s);  // leaves room for marks at the end of a curve
   panel.y = {.label = plan.label, .name = plan.name, .per_unit = plan.per_unit};
   plot::fit(panel.y, panel.curves, &Curve::y);
   return panel;
@@ -184,7 +184,8 @@ Figure hysteresis(const PaperGroup& over_e) {
   return figure;
 }
 
-/// Creates panels with the paths of the tip. The paper has no such panel for its group over H.
+/// Creates panels with the paths of the tip. The paper has no such panel for its group in which H
+/// varies.
 Figure trajectory(const PaperGroups& groups) {
   Figure figure{.title = "Fig. 7: path of the fingertip during contact",
                 .subtitle = "The tip touches on the right and slides to the left",

@@ -23,7 +23,8 @@ struct PaperGroup {
   std::vector<PaperCase> cases;
 };
 
-/// The paper's groups in its order: over H, over e*, over small mu and over large mu.
+/// The groups in the order of the paper. They vary H, e*, mu among small values, and mu among large
+/// values.
 using PaperGroups = std::vector<PaperGroup>;
 
 /// Solves each case once. Throws solver::SolveError if a case cannot be solved, and

@@ -60,7 +60,8 @@ std::vector<double> round_edges(const Range& range, double bins) {
   std::vector<double> edges;
   for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
        ++i) {
-    // For steps below 1, a quotient of two whole numbers is the same double as the typed decimal.
+    // For steps below 1, divides two integers. The quotient is the same double as the decimal that
+    // a user types.
     edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
   }
   return edges;
@@ -144,7 +145,7 @@ std::vector<double> edges_between(const std::vector<double>& values, bool is_log
     edges.push_back(is_logarithmic ? std::sqrt(values[i - 1]) * std::sqrt(values[i])
                                    : 0.5 * (values[i - 1] + values[i]));
   }
-  // The outer cells extend as far beyond their value as towards the inner neighbour.
+  // Makes the outer cells symmetric about their values.
   const auto mirrored = [is_logarithmic](double end, double inner) {
     return is_logarithmic ? end / inner * end : end + (end - inner);
   };
@@ -192,7 +193,7 @@ std::vector<std::size_t> places_in(const Cells& cells, const Answer& answer) {
   return places;
 }
 
-/// A cell and the number of a text in it.
+/// A cell and the index of a text in AnswerColumn::words.
 using WordOfCell = std::pair<std::size_t, std::uint32_t>;
 
 /// Sets the value of each cell to its most frequent text. Of equally frequent texts, the one that
@@ -224,7 +225,7 @@ void AnswerColumn::add(const protocol::Cell& cell) {
                     : cell.kind == CellKind::kInteger ? static_cast<double>(cell.integer)
                                                       : kNoNumber);
   if (cell.kind == CellKind::kText || !word_of_row.empty()) {
-    word_of_row.resize(numbers.size(), kNoWord);  // fills the rows before the first text
+    word_of_row.resize(numbers.size(), kNoWord);  // rows without a text get kNoWord
   }
   if (cell.kind == CellKind::kText) {
     const auto next = static_cast<std::uint32_t>(words.size());

@@ -55,7 +55,7 @@ struct Curve {
   std::string name = {};  ///< entry in the key; empty: no entry
   std::vector<double> x = {};
   std::vector<double> y = {};
-  std::size_t stroke = 0;         ///< number of colour, dash pattern and mark
+  std::size_t stroke = 0;         ///< index of the colour, dash pattern and mark
   std::optional<double> by = {};  ///< value of the column Panel::by_name on this line
   /// Values that colour the points by the colour scale; if empty, `stroke` gives the colour.
   std::vector<double> colours = {};
@@ -203,7 +203,8 @@ struct Gathered {
 /// averaged; for text the most frequent value is taken. Cells without a row have no result.
 Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y);
 
-/// Marks cells without a result as excluded by the condition if `answer` (x, y) has a row for them.
+/// Marks a cell without a result as excluded by the condition if `answer` has a row with the x and
+/// y of the cell.
 void mark_filtered(Cells& cells, const Answer& answer);
 
 struct GatheredLines {
@@ -212,9 +213,9 @@ struct GatheredLines {
   std::uint64_t most_at_a_place = 0;  ///< maximum number of rows with a value at one x of a line
 };
 
-/// Groups rows of x, y and optionally the value that distinguishes lines. Lines are sorted by x;
-/// several rows at one x are averaged. A line has a gap at each row without a value, and at each of
-/// `x_values` between its ends for which it has no row.
+/// Groups rows of x, y and, optionally, the value that distinguishes lines. Lines are sorted by x;
+/// several rows at one x are averaged. A line has a gap at each row without a value. It also has a
+/// gap at each of `x_values` between its ends for which it has no row.
 GatheredLines gathered_lines(const Answer& answer, const std::vector<double>& x_values);
 
 }  // namespace oblique::client::plot

@@ -138,7 +138,8 @@ int kind_of(const Cells& cells, std::size_t cell) {
                                          : kNoKind;
 }
 
-/// A panel in equal parts, row by row from below. Each part refers to the cell at its middle.
+/// A panel divided into equal parts, row by row from below. Each part has the index of the cell at
+/// its middle.
 struct Raster {
   std::size_t columns;
   std::size_t rows;
@@ -164,8 +165,8 @@ Raster raster_of(const Panel& panel, std::size_t columns, std::size_t rows) {
   return raster;
 }
 
-/// Returns where a map shows the letter of each category: the middles of its largest squares, far
-/// apart from each other.
+/// Returns the places of the letters in a map. They are the middles of the largest squares of each
+/// category, far apart from each other.
 std::vector<std::size_t> letter_places(const Cells& cells, const Raster& raster) {
   const std::size_t columns = raster.columns;
   const auto kind_at = [&](std::size_t part) { return kind_of(cells, raster.cells[part]); };
@@ -384,7 +385,7 @@ class Script {
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
     add("set key {} maxcols {}\n",
         !is_below  ? "rmargin top vertical"
-        : is_text_ ? "bmargin left horizontal"  // width -1 would make letters overlap
+        : is_text_ ? "bmargin left horizontal"  // width -1 makes letters overlap
                    : "bmargin left horizontal width -1",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {
@@ -478,7 +479,8 @@ class Script {
       }
     }
     if (has_borders) {
-      // The picture is wider than the map, so a part of the raster is about 5 pixels wide and high.
+      // Parts of the raster are about 5 pixels wide and high, because the picture is wider than the
+      // map.
       const auto raster = raster_of(panel, static_cast<std::size_t>(0.13 * size_.width),
                                     static_cast<std::size_t>(0.13 * size_.height));
       for (const std::size_t place : letter_places(cells, raster)) {

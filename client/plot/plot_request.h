@@ -64,12 +64,12 @@ inline constexpr std::uint64_t kMaxListed = 100'000;
 /// The structure of a study that pictures need: axes, blocks and numbers of points.
 struct StudyShape {
   std::vector<StudyAxis> axes;  ///< in the order of the recipe: model keys, then H, mu and e
-  bool is_grid = true;          ///< the chosen block multiplies its axes
+  bool is_grid = true;          ///< the chosen block combines all values of its axes
   std::size_t block = 0;        ///< index of the chosen block, from 0
   std::uint64_t first_point = 0;
   std::uint64_t block_points = 0;
   std::size_t blocks = 1;     ///< of the study
-  std::uint64_t points = 0;   ///< number in all blocks, including points that filters leave out
+  std::uint64_t points = 0;   ///< points in all blocks, including those that filters leave out
   bool is_one_block = false;  ///< the study has several blocks and the picture shows one
 
   /// Returns the axis with that key or column, or nullptr.
@@ -80,11 +80,11 @@ struct StudyShape {
   std::vector<std::string_view> keys() const;
 };
 
-/// Reads the structure of the study. If it has several blocks, a map or lines show one of them:
-/// `--block`, else the block with the most points among those with the requested axes and values.
-/// The picture shows all blocks with `--block all`, if no suitable block is a grid, and for points
-/// and histograms without --block. Throws solver::InputError for an unknown block and for a recipe
-/// without points.
+/// Reads the structure of the study. If the study has several blocks, a map or lines show one of
+/// them: the block of `--block`, else the block with the most points that has the requested axes
+/// and values. The picture shows all blocks with `--block all`, if no suitable block is a grid,
+/// and, without --block, if it shows points or a histogram. Throws solver::InputError for an
+/// unknown block and for a recipe without points.
 StudyShape shape_for(const protocol::Recipe& recipe, const PlotRequest& request);
 
 struct ChosenAxis {
@@ -93,8 +93,9 @@ struct ChosenAxis {
   const StudyAxis* axis = nullptr;  ///< nullptr for a column of results
 };
 
-/// Returns the key or column that the text of a flag names. Throws solver::InputError for an
-/// unknown word, with the nearest known word; the source checks other expressions.
+/// Returns the key or column that the text of a flag names. A text that is not a single word is
+/// returned as an expression; the source of the rows checks it. Throws solver::InputError for an
+/// unknown word, and suggests the nearest known one.
 ChosenAxis chosen_axis(const std::string& flag, const std::string& text, const StudyShape& shape);
 
 /// SQL condition that selects the points of a picture.
@@ -105,9 +106,10 @@ struct Condition {
   std::vector<std::string> said;   ///< sentences about choices
 };
 
-/// Combines --where and --at. With `fixes_others`, each other open axis is fixed at its first
-/// value. `drawn` holds the axes of the picture. Throws solver::InputError if an --at names no key,
-/// or a value that the key does not have; the error gives the nearest.
+/// Combines --where and --at. `drawn` holds the axes of the picture. With `fixes_others`, other
+/// axes that vary are fixed at their first values, unless --at or --where names them. Throws
+/// solver::InputError for an --at with an unknown key, or with a value that the key does not have;
+/// the error gives the nearest.
 Condition condition_of(const PlotRequest& request, const StudyShape& shape,
                        const std::vector<ChosenAxis>& drawn, bool fixes_others);
 

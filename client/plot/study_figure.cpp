@@ -125,7 +125,8 @@ class FigureBuilder {
     note("Nothing to draw: " + why + ".");
   }
 
-  /// Queries columns under a condition. If grouped, the answer has one row per pair of values.
+  /// Queries the columns of the points that meet a condition. If grouped, the answer has one row
+  /// per combination of values.
   Answer query(const std::vector<std::string>& columns, const std::string& where,
                bool is_grouped = false) {
     ResultQuery query;
@@ -318,7 +319,7 @@ class FigureBuilder {
     const std::string remedy = fmt::format(
         "has fewer than two axes{}: use --lines, --scatter or --histogram, or name --x and --y",
         request_.at.empty() ? "" : " that --at leaves open");
-    // The axis of --y is not available for x.
+    // x must not take the axis that --y names.
     std::vector<ChosenAxis> taken;
     if (!request_.y.empty()) {
       taken.push_back(chosen_axis("--y", request_.y, shape_));
@@ -366,7 +367,7 @@ class FigureBuilder {
 
   // ---- Lines ------------------------------------------------------------------------------------
 
-  /// Returns the axis that gives one line per value, or nothing if one line is drawn.
+  /// Returns the axis that has one line for each of its values; nothing if there is only one line.
   std::optional<ChosenAxis> lines_by(const ChosenAxis& x) const {
     if (!request_.by.empty()) {
       return chosen_axis("--by", request_.by, shape_);

@@ -60,9 +60,9 @@ void refuse_forked_child();
 class Stopped {};
 
 /// Runs `work` on its own thread without the interpreter's lock and returns its result. Every 50 ms
-/// it handles signals and calls `meanwhile`. If either raises, as Ctrl-C does, it sets `stop`,
-/// calls `when_stopped` and soon throws the exception. `work` may still run then, so it must own
-/// all data that it uses.
+/// it handles signals and calls `meanwhile`. If one of these raises an exception, as Ctrl-C does,
+/// it sets `stop`, calls `when_stopped` and soon throws the exception. `work` may still run at that
+/// time, so it must own all data that it uses.
 template <class Result>
 Result interruptibly(const std::function<Result(const std::atomic<bool>& stop)>& work,
                      const std::function<void()>& when_stopped = {},

@@ -51,9 +51,9 @@ class ResultArrays {
   void set(std::size_t point, const solver::CaseResult& result);
   void set_error(std::size_t point, std::string_view error) { errors_.set(point, error); }
 
-  /// Moves the outputs into a dict, under the names of `oblique solve --json`: an array for each
-  /// number, (texts, index of each point's text or -1) for each text, and `error`. Under `lists`,
-  /// each list has an array for each of its members, and the `offsets` of the points.
+  /// Moves the outputs into a dict with the names of `oblique solve --json`. A number becomes an
+  /// array. A text becomes (texts, index of each point's text or -1). `error` holds the errors.
+  /// Each list in `lists` has an array for each member, and the `offsets` of the points.
   py::dict dict();
 
  private:
@@ -234,9 +234,9 @@ std::vector<double> values_of(std::string_view key, const py::handle& array) {
   return numbers;
 }
 
-/// Adds a key. A single number of the model goes to `model`. A number of a point, a text
-/// (expression) or an array with one value per point goes to `axes`, which are ordered by
-/// key_number.
+/// Adds a key. A single number of a model key goes to `model`. Everything else goes to `axes`, by
+/// key_number: a number of a point key or link, a text (expression), or an array with one value per
+/// point.
 void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>& axes,
              const std::string& name, const py::handle& value) {
   const std::size_t number = protocol::key_number(name);
@@ -300,7 +300,7 @@ std::vector<double> lengths_of(const py::handle& value) {
 /// Reads a dict of numbers, texts (expressions), arrays of `points` values, and a list `lengths`.
 /// Throws InputError, with key, value and allowed range, for an unknown key (with the nearest known
 /// key), a wrong combination, and a value that is wrong for all points. A wrong value in an array
-/// becomes an error of its model, or an error of the point when that is solved.
+/// becomes the error of its model or, when the point is solved, the error of the point.
 GivenPoints points_of(const py::dict& keys, std::size_t points) {
   protocol::ModelInput model;
   std::map<std::size_t, protocol::Axis> keyed_axes;
@@ -337,10 +337,11 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
   }
   protocol::Block block = protocol::block_of(std::move(axes));
   block.set_zip(true);
-  std::map<std::vector<std::uint64_t>, std::size_t> known;  // models by the bits of their values
+  // The index of each model, by the bits of its values.
+  std::map<std::vector<std::uint64_t>, std::size_t> known;
   all.points.reserve(points);
   const auto add = [&](std::span<const double> values) {
-    std::vector<std::uint64_t> bits;  // unlike numbers, bits can be compared for NaN
+    std::vector<std::uint64_t> bits;  // not numbers, because NaN does not equal itself
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
       bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
     }

@@ -39,8 +39,8 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .key = settings.key};
 }
 
-/// Returns the first item of the next page, or 0 if `requested` was the last. An answer that does
-/// not advance also gives 0, because otherwise the loop would never end.
+/// Returns the first item of the next page, or 0 after the last page. Also returns 0 if the answer
+/// does not advance, because otherwise the caller's loop would never end.
 std::uint64_t next_page(std::uint64_t requested, std::uint64_t answered) {
   return answered > requested ? answered : 0;
 }
@@ -227,7 +227,8 @@ void Connection::check(const protocol::ClientReply& reply, int kind) const {
   if (reply.has_error()) {
     throw ServerError(reply.error().message());
   }
-  // A reply has the kind number of its request. Messages of other programs may decode as any kind.
+  // A reply has the kind number of its request. The check also rejects messages of other programs,
+  // which may decode as a reply of any kind.
   if (static_cast<int>(reply.kind_case()) != kind) {
     throw ConnectionError(
         fmt::format("the reply from {} is not that of an oblique-server to a client: check the "
@@ -299,7 +300,7 @@ protocol::QueryReply Connection::more_rows() {
   request.mutable_more_rows()->set_request_id(rows_->request_id);
   request.mutable_more_rows()->set_received(rows_->chunks);
   send_about_rows(std::move(request));
-  // Time during which this process was stopped or the machine slept does not count.
+  // Does not count time during which this process was stopped or the machine slept.
   constexpr std::chrono::milliseconds kLongestSlice{500};
   const std::chrono::milliseconds timeout(settings_.timeout_ms);
   Clock::duration waited{0};
@@ -363,7 +364,7 @@ std::vector<protocol::StudyStatus> Connection::status(const std::string& study, 
 protocol::StudyStatus Connection::status_of(std::uint64_t study_id, const std::string& name,
                                             const Tell& tell) {
   protocol::ClientRequest request;
-  request.mutable_status()->set_study(name);  // the server's error contains it
+  request.mutable_status()->set_study(name);  // the server's error contains the name
   request.mutable_status()->set_study_id(study_id);
   const auto reply = call(std::move(request), tell).status();
   if (reply.studies_size() != 1) {

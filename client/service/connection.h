@@ -96,9 +96,9 @@ class Connection : public Source {
   protocol::WorkersReply workers();  ///< all workers
 
   protocol::SubmitReply submit(const Study& study, const SubmitSettings& settings = {});
-  /// Waits as long as the server reports that it works on the trace. The server limits the time.
+  /// Waits while the server reports that it works on the trace. The server limits the time.
   protocol::TraceReply trace(protocol::TraceRequest trace);
-  /// Changes the study called `study`. Renaming and deleting also need its number.
+  /// Changes the study called `study`. Renaming and deleting also need the number of the study.
   protocol::ChangeReply change(const std::string& study, protocol::StudyChange change,
                                std::uint64_t study_id = 0, const std::string& new_name = {});
   protocol::Recipe describe(const std::string& study);
@@ -159,7 +159,7 @@ class Connection : public Source {
   zmq::context_t context_;
   zmq::socket_t socket_;
   protocol::SocketMonitor monitor_;
-  unsigned attempt_ = 0;          ///< attempts to connect, which alternate address families
+  unsigned attempt_ = 0;          ///< attempts to connect; they alternate between address families
   unsigned failed_attempts_ = 0;  ///< attempts since the last successful one
   Clock::time_point connecting_since_ = Clock::now();
   std::uint64_t connections_before_ = 0;  ///< number of connections before the present attempt

@@ -35,9 +35,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Startup takes long for a large database, because the server first reads its completed points.
+// Startup takes long for a large database, because the server first reads the completed points.
 constexpr std::chrono::seconds kReadyWithin{60};
-// Before it ends, a worker finishes its point (slow on fine meshes), and the server commits.
+// Processes need time to end: a worker finishes its point (slow on fine meshes), and the server
+// commits.
 constexpr std::chrono::seconds kStopWithin{5};
 constexpr std::chrono::milliseconds kPause{1};
 
@@ -210,7 +211,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     child.arguments.emplace_back("--allow-network-disk");
   }
   server_ = std::make_unique<ChildProcess>(child);
-  ready.write.close();  // only the server keeps this end open, so the pipe closes when it ends
+  ready.write.close();  // now the pipe closes when the server ends
   const auto urls = nlohmann::json::parse(first_line(ready.read, *server_, settings.database, stop),
                                           nullptr, false);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker")) {

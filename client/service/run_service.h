@@ -28,13 +28,12 @@ struct ServiceSettings {
   int workers = 1;                      ///< number of worker processes, which share the cores
   bool allow_network_disk = false;      ///< permits a database on a network file system
   std::string http = "off";             ///< address of the web page: ADDRESS:PORT
-  std::uint64_t fall_memory_bytes = 0;  ///< for all workers; 0: an eighth of the free memory
-                                        ///< memory
+  std::uint64_t fall_memory_bytes = 0;  ///< of all workers; 0: an eighth of the free memory
   std::string only_study{};             ///< solves only this study; empty: all studies
   bool verbose = false;                 ///< server and workers write to our standard error
 };
 
-/// Explains why a server that was started on the database may not answer, as part of a sentence.
+/// Returns, as part of a sentence, why a server that was started on the database may not answer.
 std::string why_silent(const std::filesystem::path& database);
 
 /// Temporary keys in a folder below TMPDIR that only its owner can read.

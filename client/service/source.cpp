@@ -14,7 +14,8 @@
 namespace oblique::client {
 namespace {
 
-/// Returns the result of `call`. Turns a StatementError into InputError: users write statements.
+/// Returns the result of `call`. Turns a StatementError into InputError, because the user wrote the
+/// statement.
 template <class Call>
 auto answered(const Call& call) {
   try {
@@ -40,7 +41,7 @@ class Database : public Source {
   Database(std::string file, std::int64_t timeout_ms) : file_(std::move(file)), reader_(file_) {
     constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
     limits_.time_limit_ms = timeout_ms;
-    // The limit holds for the whole process, in which nothing else uses SQLite.
+    // The memory limit holds for the whole process. Nothing else in the process uses SQLite.
     sqlite3_hard_heap_limit64(kHeapBytes);
   }
 

@@ -55,7 +55,7 @@ class Source {
  public:
   virtual ~Source() = default;
   /// Runs a read-only statement or a StudyQuery. Throws solver::InputError for a wrong statement,
-  /// and the errors of the source; either may come with the first chunk.
+  /// and the errors of the source. The stream may throw them later, with the first chunk.
   virtual std::unique_ptr<RowStream> rows(protocol::QueryRequest request) = 0;
   /// Returns the whole answer to one statement. Use it only for answers that fit into memory.
   protocol::Table query(const std::string& sql);
@@ -64,7 +64,7 @@ class Source {
   virtual std::vector<protocol::StudyStatus> status(const std::string& study, const Tell& tell) = 0;
   std::vector<protocol::StudyStatus> status(const std::string& study) { return status(study, {}); }
   /// Returns the status of the study with this number, even if it was renamed. Throws
-  /// std::runtime_error, which contains `name`, if the study does not exist.
+  /// std::runtime_error, whose text contains `name`, if the study does not exist.
   virtual protocol::StudyStatus status_of(std::uint64_t study_id, const std::string& name,
                                           const Tell& tell);
   /// StatusReply.access of the last status: which peers may connect; empty for a file.

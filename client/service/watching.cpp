@@ -20,8 +20,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-// Pause between status requests: at first short enough to notice the end of a short study, later
-// longer, so that there are few requests.
+// Pause between status requests. It begins short, to notice the end of a short study, and grows, so
+// that there are few requests.
 Seconds pause_after(Seconds elapsed) {
   constexpr Seconds kShortest{0.004};
   constexpr Seconds kLongest{0.5};

@@ -85,8 +85,8 @@ protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, Blo
       has_spacing && parts[3] == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
 }
 
-/// Parses @FILE:COLUMN. @FILE without a column means the file's only column, or the column with the
-/// name of the key.
+/// Parses @FILE:COLUMN. Without a column, @FILE means the only column of the file, or else the
+/// column with the name of the key.
 protocol::Axis column_of_flag(const ParameterKey& key, std::string_view text, CsvFiles& files) {
   const auto colon = text.rfind(':');
   const CsvFile& file =
@@ -127,7 +127,8 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   return written;
 }
 
-/// Whether a text is NAME(...) with a distribution or, in a sample, any name but a function's.
+/// Whether a text is NAME(...) with the name of a distribution. In a sample, any name counts except
+/// the name of a function.
 bool is_distribution(std::string_view text, BlockKind kind) {
   const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
   const auto functions = expressions::function_names();
@@ -267,8 +268,8 @@ void add_block_flags(CLI::App& command, PointFlags& flags) {
       ->group("Points");
 }
 
-/// Formats help without the flags for the single lengths of 64 links, which the text of `--lengths`
-/// names. Hiding the flags would also remove their names from error messages.
+/// Formats help without the flags for single lengths, of which there are 64. The text of
+/// `--lengths` names them. If CLI11 hid the flags, error messages would not contain their names.
 class BriefHelp : public CLI::Formatter {
  public:
   std::string make_group(std::string group, bool is_positional,

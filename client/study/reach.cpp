@@ -17,8 +17,8 @@ namespace oblique::client {
 
 namespace {
 
-/// Returns the largest H [m] of a block if all its models have the same values of H, and 0 if the
-/// largest H depends on the point.
+/// Returns the largest H [m] of a block if all its models have the same values of H. Returns 0 if
+/// the largest H depends on the point.
 double largest_H_m(const protocol::Block& block, std::uint64_t models) {
   const protocol::Axis& H = *protocol::point_axes(block)[0];
   const bool is_shared =
@@ -58,7 +58,8 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
   }
 }
 
-/// Returns the drop [m] that the tip reaches, at most H. Assumes H after kMaxFalls solved falls.
+/// Returns the drop [m] that the tip reaches, at most H. After kMaxFalls solved falls, assumes that
+/// the tip reaches H.
 double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m) {
   constexpr int kCoarse = 2;      // elements per link: cheap, and nearly the same fall
   constexpr double kRoom = 0.98;  // safety margin for the drop on the coarse mesh

@@ -10,8 +10,8 @@
 
 namespace oblique::client {
 
-/// Returns the largest drop [m] of the tip of a finger that falls from rest, before the tip turns
-/// back. It solves a fall.
+/// Solves the fall of a finger from rest. Returns the largest drop [m] of the tip before the tip
+/// turns back.
 using LargestDrop = std::function<double(const solver::ModelParameters& model)>;
 
 /// Checks that the tip reaches every H of a study. Throws solver::InputError with key and block.

@@ -223,7 +223,7 @@ class BlockReader {
   }
 
  private:
-  /// Throws if an unknown key resembles a key of a block more than an axis.
+  /// Throws if `key` is no key of an axis and resembles a key of a block.
   void check_key(const toml::key& key) const {
     if (!protocol::nearest(key.str(), kBlockKeys).empty() && !protocol::is_axis_key(key.str())) {
       file_.fail(key, fmt::format("{}: besides its axes a block has {}",

@@ -122,7 +122,7 @@ SolvedAgain solve_in_this_process(Console& console, const PointSpec& point,
     return {.point = point, .result = result, .solver = "here"};
   } catch (const solver::SolveError& error) {
     throw_unsolved(point.study, point.point, error.what());
-    // The study was accepted with this value, so it is not wrong usage.
+    // The study was accepted with this value, so the error is not wrong usage.
   } catch (const solver::InputError& error) {
     throw_unsolved(point.study, point.point, error.what());
   }
@@ -159,7 +159,7 @@ PointSpec point_in(const std::string& database, const protocol::StudyStatus& stu
           table.model(values.model)};
 }
 
-/// Requests the definition of the point from a server, which does not solve it.
+/// Requests the definition of the point from a server. The server does not solve the point.
 PointSpec point_at(Connection& connection, const std::string& study, std::uint64_t point) {
   protocol::TraceRequest request;
   request.set_study(study);
@@ -168,7 +168,7 @@ PointSpec point_at(Connection& connection, const std::string& study, std::uint64
   return point_of(study, point, connection.trace(std::move(request)));
 }
 
-/// Throws ConnectionError if the reply is not a trace, and ServerError if it is too long.
+/// Throws ConnectionError for an invalid trace, and ServerError for a trace that is too long.
 void check_trace(const Connection& connection, const protocol::Trace& trace,
                  const solver::TraceShape& shape, bool with_fall) {
   if (const std::string fault = protocol::fault_of_trace(trace, shape, with_fall); !fault.empty()) {
@@ -399,7 +399,7 @@ SolvedAgain solve_again(Console& console, const PointSource& from, const std::st
     }
   }
   const auto stored = stored_row(*source, study, point);
-  if (text_in(stored, "status") == "failed") {  // solving it here may also crash this process
+  if (text_in(stored, "status") == "failed") {  // solving the point here may crash this process
     throw std::runtime_error(
         fmt::format("point {} of {} failed and has no trace: {}. `oblique retry {}` solves it "
                     "again; `oblique solve --trace` with its values shows where it fails",

@@ -72,7 +72,8 @@ function submissionOf(form) {
   if (name === "") throw new Error("the study needs a name");
   const sample = sampleOf(form.sample);
   const axis = ([key, text]) => axisOf(key, text, sample !== undefined);
-  // Single values belong to the model, as with flags. Axes of model keys come first, by name.
+  // Keys with a single value belong to the model, as with flags. Other model keys become axes, in
+  // the order of their names, before H, mu and e.
   const others = otherKeys(form).map(axis);
   const isSingle = (one) => one.values?.length === 1 && !/^length\d/.test(one.key);
   const varied = others.filter((one) => !isSingle(one)).sort((a, b) => (a.key < b.key ? -1 : 1));

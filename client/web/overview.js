@@ -190,7 +190,7 @@ export function overview(root, place) {
         : "";
   }
 
-  /** Reads all studies again. A call during a running read repeats the read afterwards. */
+  /** Reads all studies again. A call during a read causes one more read after it. */
   async function read() {
     wantsAnother = true;
     if (isReading) return;
@@ -219,7 +219,7 @@ export function overview(root, place) {
       now = update;
       if (update.is_stopping) say("The server is stopping.");
       for (const study of update.studies) studies.set(study.id, study);
-      // An update contains only some studies. The others are read when the state of a study
+      // An update contains only some studies. All studies are read when the state of a study
       // changes, or every few seconds.
       const isOld = update.unlisted > 0 && performance.now() - readAt > retryMs;
       const changed = JSON.stringify(update.studies_by_state);

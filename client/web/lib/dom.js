@@ -26,7 +26,7 @@ export function h(selector, ...given) {
 
 const isShown = (child) => child !== null && child !== undefined && child !== false;
 
-/** Creates a line for messages; returns {element, say}. */
+/** Creates a line for messages. Returns {element, say}; `say` shows a message. */
 export function statusLine() {
   const element = h("p.said", { role: "status" });
   const say = (text, isBad = false) => {
@@ -85,7 +85,7 @@ export const command = (name, text) =>
 
 const focusable = "a[href], button, input, select, [tabindex]";
 const containers = ["THEAD", "TBODY", "TR"];
-// The state of these elements is not an attribute, so equal elements may show different values.
+// The values of these elements are not attributes, so equal elements may show different values.
 const withState = "input, select, canvas";
 
 /**

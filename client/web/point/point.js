@@ -155,7 +155,7 @@ function saveTrace(trace, name) {
   saveFile(`${name}.csv`, csv([head, ...Array.from({ length: trace.rows }, row)]));
 }
 
-/** Shows the time histories of a trace; returns the objects that need closing. */
+/** Shows the time histories of a trace; returns the objects that the caller must close. */
 function showTrace(place, trace, name) {
   const charts = chartsOf(trace, (row) => finger.show(row));
   const finger = fingerOf(trace, (row) => charts.forEach((chart) => chart.pointAt(row)));
@@ -245,7 +245,7 @@ export async function pointView(root, place, id, point) {
         if (update.row) show();
         done = completedNow;
       } catch {
-        // the next overview causes another attempt
+        // the next overview starts another attempt
       }
       isAsking = false;
     },

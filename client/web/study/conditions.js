@@ -91,7 +91,7 @@ function heldPart(blocks, { head }) {
   return joined(...held, isOfBlock ? `point >= ${first} AND point < ${first + points}` : "");
 }
 
-/** Returns the condition for the shown lines and a range of their output. */
+/** Returns the condition for the shown lines and, if given, a range of their output. */
 function linesPart({ y, z, least, most }, range) {
   const isSome = y.name && !y.isWhole;
   const lines = isSome ? `${columnOfAxis(y.name)} IN (${Array.from(y.values).join(", ")})` : "";

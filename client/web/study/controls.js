@@ -41,7 +41,7 @@ export function controlsOf(view) {
     });
   }
 
-  /** Returns the columns that a picture can show, and always `shownColumn`. */
+  /** Returns the columns that a picture can show. Always includes `shownColumn`. */
   function columnChoices(shownColumn, mayBeCategory) {
     const found = view.columns.filter(
       ([name]) => mayBeCategory || view.columnOf(name).picture === "numbers",

@@ -1,6 +1,6 @@
 // The parameters (fields) in the address of a study: picture and axes.
 
-/** The axes of a grid whose values do not follow from other axes. */
+/** The axes of a grid whose values are neither expressions nor drawn from distributions. */
 export const ownAxes = (block) =>
   block.kind === "grid" ? block.axes.filter((axis) => !axis.expression && !axis.distribution) : [];
 

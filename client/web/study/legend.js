@@ -16,7 +16,7 @@ export const emptyTexts = {
   filtered: "filtered out",
 };
 
-/** Returns the range of the colours. The address gives its ends, or else the picture. */
+/** Returns the range of the colours. Each end comes from the address, or else from the picture. */
 export function spanOf(view, { least, most }) {
   const end = (name) => {
     const isNumber = view.field(name) !== "" && Number.isFinite(Number(view.field(name)));

@@ -116,8 +116,8 @@ function cellImage(picture, look, cells, selected, width, height) {
   const dark = colours.isDark();
   const nx = picture.x.values.length;
   const of = scale(look.from, look.to, look.zLog);
-  // A code for each cell, computed once instead of once per pixel: a colour, the look of a
-  // category, or, for an empty cell, -1 minus the index of its kind.
+  // A code for each cell: a colour, the look of a category, or, for an empty cell, -1 minus the
+  // index of its kind. Computed once per cell, because a cell has many pixels.
   const codes = Int32Array.from(picture.values, (value, i) => {
     const why = picture.whyEmpty(i);
     if (why) return -1 - emptyKinds.indexOf(why);
@@ -276,7 +276,7 @@ export class MapCanvas {
 
   #frame([x, y, width, height], thick) {
     const context = this.top.getContext("2d");
-    // Draws the frame of a small cell at a distance from the cell.
+    // The frame of a small cell is larger than the cell.
     const grow = Math.max(0, 5 - Math.min(width, height));
     const line = (colour, lineWidth) => {
       context.strokeStyle = colour;

@@ -27,7 +27,7 @@ const mostForMedians = 100_000;
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
-/** Returns the indices of the values of an axis that the server sends, `shown` in number. */
+/** Returns the indices of the `shown` values of an axis that the server sends. */
 function numbersOf({ first, last }, shown) {
   const steps = Math.max(shown - 1, 1);
   const number = (i) => first + Math.floor((2 * i * (last - first) + steps) / (2 * steps));
@@ -217,7 +217,7 @@ async function medians(view, signal) {
   };
 }
 
-/** Returns the filter and the zoomed part of a picture of columns as one condition. */
+/** Returns one condition for the filter and the zoomed part of a picture whose axes are columns. */
 function shownWhere(view) {
   const part = (name) => within(view.field(name), view.field(`${name}0`), view.field(`${name}1`));
   return joined(view.field("where"), part("x"), view.field("pic") === "scatter" ? part("y") : "");

@@ -3,7 +3,7 @@ import { post } from "../api.js";
 import { button, h, labelled } from "../lib/dom.js";
 import { count } from "../lib/format.js";
 
-/** Minimum number of steps along a refined axis, which has at least twice as many as before. */
+/** Minimum number of steps along a refined axis. Refining at least doubles the number. */
 const leastSteps = 64;
 
 const integrators = ["explicit", "generalized-alpha"];
@@ -37,7 +37,7 @@ function finerAxis(view, name, axis) {
 }
 
 /**
- * Returns the axes of the shown block, of which the shown two have more values. Other axes keep
+ * Returns the axes of the shown block. The two axes of the map get more values; other axes keep
  * their selected values.
  */
 function finerAxes(view) {

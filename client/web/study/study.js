@@ -201,7 +201,7 @@ export class StudyView {
       h("section", h("h2", "Export"), this.exports),
     );
     this.#showAddress();
-    // The server answers in order, so this request follows those of picture and table.
+    // The server answers in order, so this request is sent after those for picture and table.
     this.status.element.after(modelLine(study, place.signal));
   }
 

@@ -96,7 +96,7 @@ export class PointTable {
     this.#query = "";
     if (!error.isSilence) this.table.replaceChildren();
     this.said.textContent = "";
-    // The study shows an error in a condition beside the condition's field.
+    // Leaves errors in a condition to the view of the study, which shows them beside the condition.
     const isOfCondition =
       error.status === 400 && (this.view.field("where") || this.view.field("mark"));
     if (!isOfCondition) this.view.complain(error);
@@ -147,6 +147,6 @@ export class PointTable {
     const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });
     this.load();
-    this.view.draw(); // the shown commands contain the order
+    this.view.draw(); // the commands that the view shows contain the order
   }
 }
