@@ -28,7 +28,7 @@ inline std::uint64_t mark_of(double H) {
   return static_cast<std::uint64_t>((H - 1.0) / kMarkInH);
 }
 
-/// Returns the drop H of all points of a study. It encodes `mark`, the number of the study.
+/// Returns the drop H of all points of a study. H encodes `mark`, the number of the study.
 inline double marked_H(std::uint64_t mark) {
   return 1.0 + static_cast<double>(mark) * kMarkInH;
 }
@@ -261,7 +261,7 @@ class SimulatedWorker {
 
 using server::StudyState;
 
-/// Returns a recipe of `points` points with this H. Each model has `points_a_model` points; the
+/// Returns a recipe of `points` points with this H. Each model has `points_per_model` points; the
 /// last model has the remaining points. E determines the fall and cycles through three values, so
 /// models with the same fall are not neighbours.
 inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_per_model,

@@ -179,7 +179,7 @@ class SimulatedServer final : public server::Ports {
     clients->break_links();
     after(world_.faults ? world_.between(1, 5000) : 10, [this] { start(); });
   }
-  /// Simulates a crash and returns true if the process died in a write or a sync failed.
+  /// If the process died in a write or a sync failed, crashes the server and returns true.
   bool ends() {
     const bool sync_failed = commits_->is_gone();
     if (!disk_.died() && !sync_failed) {

@@ -17,7 +17,7 @@ struct SimulationSettings {
   bool storms = false;
 };
 
-/// Number of events by name in one or more runs. It shows that the faults happened.
+/// Number of events by name in one or more runs. The numbers show that the faults happened.
 using SimulationOutcome = std::map<std::string, std::uint64_t>;
 void add(SimulationOutcome& all, const SimulationOutcome& more);
 std::string text_of(const SimulationOutcome& outcome);

@@ -51,7 +51,7 @@ ScriptedServer::Answer gives(
   };
 }
 
-/// Answers as a server with one study, whose state is `state`.
+/// Returns the answers of a server with one study in the state `state`.
 ScriptedServer::Answer has_study(const std::string& state) {
   return [state](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);

@@ -141,7 +141,7 @@ TEST(Minimise, FindsTheMinimumOfRosenbrocksFunction) {
 
 TEST(Fit, KeepsAnUnknownAtABoundBehindWhichTheMinimumIs) {
   auto problem = line_problem();
-  problem.unknowns[1] = {"b", 1.5, 5.0, 2.0};  // without the bound b would be 0.85
+  problem.unknowns[1] = {"b", 1.5, 5.0, 2.0};  // without the bound, b would be 0.85
   const Fit found = fit(problem);
   EXPECT_TRUE(found.unknowns[1].is_at_bound);
   EXPECT_NEAR(found.unknowns[1].estimate.value, 1.5, 1e-3);

@@ -178,8 +178,8 @@ TEST(SobolIndicesTest, ARowWithAFailedPointIsDroppedWholeAndCounted) {
   auto outputs = sobol_outputs(known.f, 3, 1, 64);
   std::vector<double> without(outputs.begin() + 5, outputs.end());
   without.erase(without.begin() + 5 * 30, without.begin() + 5 * 31);
-  outputs[3] = kNaN;                                          // A_B^2 of row 0
-  outputs[5 * 31] = std::numeric_limits<double>::infinity();  // A of row 31
+  outputs[3] = kNaN;                                          // the point A_B^2 of row 0
+  outputs[5 * 31] = std::numeric_limits<double>::infinity();  // the point A of row 31
   const auto dropped = sobol_indices(outputs, 3, 1);
   const auto never = sobol_indices(without, 3, 1);
   EXPECT_EQ(dropped.rows, 62U);

@@ -51,7 +51,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
   const Outcome refused =
       run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                            "--name", "another", "--server", server.client_url()});
-  // The submission succeeds if its rows still fit below the limit.
+  // The submission succeeds if its rows still fit below the limit of the file size.
   EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
       << refused.err;
   EXPECT_TRUE(is_running(server.process().pid()));

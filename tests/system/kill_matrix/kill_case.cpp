@@ -154,7 +154,8 @@ KillCase draw_case(std::uint64_t seed) {
   drawn.storm = storm_of(drawn.point);
   drawn.signal = entry.signal;
   drawn.occurrence = up_to(entry.highest);
-  // Without a pause the signal comes before the message is sent, with a pause of 20 ms after it.
+  // Without a pause the signal precedes the message. A pause of 20 ms lets the message be sent
+  // first.
   drawn.pause = milliseconds(random() % 2 == 0 ? 0 : 20);
   drawn.server_stops_first = random() % 2 == 0;
   if (drawn.signal == SIGSTOP) {

@@ -251,7 +251,7 @@ class ApartCycle {
   }
 
   void stop(const std::string& program, Process& process) {
-    // A program may not handle signals before its first log line.
+    // A program does not necessarily handle signals before its first log line.
     wait_until(program + " has begun",
                [&] { return process.exit_code() || !process.err().empty(); });
     if (!process.exit_code()) {
