@@ -26,7 +26,7 @@ using ::testing::IsSupersetOf;
 using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
-/// Runs `program`, which is searched in PATH, to its end in `folder`.
+/// Runs `program`, found in PATH, in `folder` until it ends.
 Outcome run_tool(const TemporaryFolder& folder, const std::string& program,
                  const std::vector<std::string>& arguments, const Environment& environment = {}) {
   std::vector<std::string> line{program};
@@ -344,8 +344,8 @@ TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
     EXPECT_EQ(verified.err, "") << unit << ": systemd-analyze prints settings that it ignores";
-    // The threshold is in tenths of systemd's exposure level. The access to network, local sockets
-    // and threads that the programs need has the level 1.2.
+    // The threshold 13 is an exposure level of 1.3. The programs need access to network, local
+    // sockets and threads, which has the level 1.2.
     const auto judged =
         run_tool(folder, "systemd-analyze",
                  {"security", "--offline=true", "--threshold=13", "--no-pager", unit});

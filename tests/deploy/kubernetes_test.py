@@ -56,7 +56,7 @@ class Manifests(unittest.TestCase):
 
     def test_programs_take_the_variables_that_pods_have(self):
         for workload, program in (SERVER, "oblique-server"), (WORKER, "oblique-worker"):
-            # Stand-ins for values that the cluster sets.
+            # Invented values for variables that the cluster sets.
             values = {n: v or {"OBLIQUE_WORKER_THREADS": "4"}.get(n, "pod-1")
                       for n, v in variables(workload).items()}
             printed = subprocess.run([PROGRAMS / program, "--print-config"], env=values, text=True,

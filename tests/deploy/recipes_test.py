@@ -41,7 +41,7 @@ class Recipe(unittest.TestCase):
         for file in (TREE / "deploy/examples").iterdir():
             shutil.copy(file, self.folder)
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("OBLIQUE_")}
-        # PATH is as with installed packages; matplotlib stores its fonts outside the home folder.
+        # PATH is as with installed packages. matplotlib stores its fonts in the test folder, not in the home folder.
         self.environment |= {"PATH": f"{PROGRAMS}:/usr/bin:/bin", "PYTHONPATH": str(MODULE),
                              "MPLCONFIGDIR": str(self.folder / "fonts")}
 

@@ -28,7 +28,7 @@ inline std::uint64_t mark_of(double H) {
   return static_cast<std::uint64_t>((H - 1.0) / kMarkInH);
 }
 
-/// Returns the H of all points of a study, which encodes the number `mark` of the study.
+/// Returns the drop H of all points of a study. H encodes `mark`, the number of the study.
 inline double marked_H(std::uint64_t mark) {
   return 1.0 + static_cast<double>(mark) * kMarkInH;
 }
@@ -46,7 +46,8 @@ inline protocol::PointResult answer_to(std::uint64_t mark, std::uint64_t point) 
 class SimulatedWorker {
  public:
   /// `peer` is the worker's number in the network. Some workers need longer for the first point of
-  /// a model. With `leaves` the worker sometimes has a time limit, after which another one starts.
+  /// a model. If `leaves` is true, the worker sometimes leaves after a time limit, and another one
+  /// starts.
   SimulatedWorker(World& world, Network& network, std::uint64_t peer, bool leaves)
       : world_(world),
         network_(network),
@@ -108,7 +109,7 @@ class SimulatedWorker {
     conversation_.emplace(hello, settings);
     apply(conversation_->start(world_.now_ms()));
   }
-  /// Runs `what` when the process is not frozen; never if the process is replaced before.
+  /// Runs `what` as soon as the process is not frozen. Drops `what` if a new process starts first.
   void when_awake(std::function<void()> what) {
     if (world_.now_ms() >= frozen_until_ms_) {
       what();
@@ -261,8 +262,8 @@ class SimulatedWorker {
 using server::StudyState;
 
 /// Returns a recipe of `points` points with this H. Each model has `points_per_model` points; the
-/// last one has the rest. E determines the fall and cycles through three values, so models with the
-/// same fall are not neighbours.
+/// last model has the remaining points. E determines the fall and cycles through three values, so
+/// models with the same fall are not neighbours.
 inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_per_model,
                                          double H) {
   using protocol::listed;
@@ -285,7 +286,8 @@ inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t poi
   return protocol::recipe_of(blocks);
 }
 
-/// Adds `filter` to each block of `recipe`. Returns nothing if it leaves out all points of a block.
+/// Adds `filter` to each block of `recipe`. Returns nothing if the filter leaves out all points of
+/// a block.
 inline std::optional<protocol::PointTable> filtered_table(protocol::Recipe recipe,
                                                           const char* filter) {
   for (protocol::Block& block : *recipe.mutable_blocks()) {
@@ -306,7 +308,7 @@ inline std::optional<protocol::PointTable> filtered_table(protocol::Recipe recip
 class SimulatedClient {
  public:
   /// `peer` is the client's number in the network. `mark` identifies the results of its study
-  /// (answer_to); a study that replaces a deleted one has a mark higher by `kClients`. Most studies
+  /// (answer_to). If a new study replaces a deleted one, `mark` grows by `kClients`. Most studies
   /// have several models.
   SimulatedClient(World& world, Network& network, std::uint64_t peer, std::string name,
                   std::uint64_t points, std::uint64_t mark)
@@ -353,7 +355,8 @@ class SimulatedClient {
     network_.close(link_, false);
     link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
   }
-  /// Appends `points` points to the recipe, which is empty at first. A filter may leave out some.
+  /// Appends `points` points to the recipe, which is empty at first. A filter may leave out some of
+  /// these points.
   void set_recipe(std::uint64_t points) {
     points_ += points;
     const std::uint64_t points_per_model = world_.chance(0.3) ? points + 1
@@ -415,8 +418,8 @@ class SimulatedClient {
       // StoreModel contains only solved results, not copies from other studies.
       request.mutable_submit()->set_no_reuse(true);
       if (world_.chance(0.3)) {
-        // A submission with another priority changes the study's priority; this is durable before
-        // the reply.
+        // A submission with another priority changes the study's priority. The change is durable
+        // before the reply.
         request.mutable_submit()->set_priority(static_cast<std::int32_t>(world_.between(-2, 2)));
       }
       *request.mutable_submit()->mutable_recipe() = recipe_;
@@ -534,10 +537,10 @@ class SimulatedClient {
   bool acknowledged_ = false;
   Intent intent_ = Intent::kSubmit;  // purpose of the last request
   bool is_answered_ = false;         // the last request was answered
-  // changes sent under this request number: a repeated request may contain another change
+  // changes sent with the present request number; a repeated request may contain another change
   std::set<protocol::StudyChange> requested_;
-  /// States that the study may have, besides done: the last acknowledged one and those requested
-  /// since. Without a value all states are possible.
+  /// States that the study may have, besides done: the last acknowledged state and the states
+  /// requested later. Without a value all states are possible.
   std::optional<std::set<server::StudyState>> possible_;
 };
 

@@ -15,11 +15,11 @@
 namespace oblique::simulation {
 
 /// The real service, scheduler and store on a simulated disk and network. The server can be killed
-/// at any moment, frozen, or stopped in an orderly way. Then another starts with the contents of
-/// the disk.
+/// at any moment, frozen, or stopped in an orderly way. After its end another server starts with
+/// the contents of the disk.
 class SimulatedServer final : public server::Ports {
  public:
-  /// Called before each acknowledgement of results, which must be durable then.
+  /// Called before each acknowledgement of results. The results must be durable by then.
   using OnAcknowledged = std::function<void(const std::string& identity, std::uint64_t sequence)>;
 
   /// Called with the contents that a starting server has read from the store.
@@ -136,7 +136,8 @@ class SimulatedServer final : public server::Ports {
 
  private:
   server::Instant now() const { return {world_.now_ms(), world_.utc_ms()}; }
-  /// Runs `what` after a delay when the process is not frozen; never if it is replaced before.
+  /// Runs `what` after a delay, as soon as the process is not frozen. Drops `what` if a new process
+  /// starts first.
   void after(std::int64_t delay_ms, std::function<void()> what) {
     world_.after(delay_ms, [this, life = life_, what = std::move(what)] {
       if (life != life_) {
@@ -178,7 +179,7 @@ class SimulatedServer final : public server::Ports {
     clients->break_links();
     after(world_.faults ? world_.between(1, 5000) : 10, [this] { start(); });
   }
-  /// Returns true, after a crash, if the process died in a write or a sync has failed.
+  /// If the process died in a write or a sync failed, crashes the server and returns true.
   bool ends() {
     const bool sync_failed = commits_->is_gone();
     if (!disk_.died() && !sync_failed) {

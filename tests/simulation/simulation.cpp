@@ -24,8 +24,8 @@ class Simulation {
       : settings_(settings),
         world_(seed),
         disk_(world_),
-        // The limit of lost workers per point is high, except in storms, because random crashes
-        // also hit sound points.
+        // Except in storms, a point may lose many workers, because random crashes also hit sound
+        // points.
         server_(world_, disk_, settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),

@@ -8,7 +8,7 @@ namespace oblique::simulation {
 
 struct SimulationSettings {
   std::int64_t chaos_ms = 25'000;     ///< duration of faults
-  std::int64_t healing_ms = 600'000;  ///< time limit after the faults for all studies to be done
+  std::int64_t healing_ms = 600'000;  ///< time after the faults within which all studies must end
   /// If true, a failed sync loses its data and later syncs succeed, as on Linux. SQLite cannot
   /// handle that: commits acknowledged after such a failure can be lost.
   bool forgetful_syncs = false;
@@ -17,14 +17,14 @@ struct SimulationSettings {
   bool storms = false;
 };
 
-/// Number of events by name in one or more runs. It shows that the faults happened.
+/// Number of events by name in one or more runs. The numbers show that the faults happened.
 using SimulationOutcome = std::map<std::string, std::uint64_t>;
 void add(SimulationOutcome& all, const SimulationOutcome& more);
 std::string text_of(const SimulationOutcome& outcome);
 
-/// Runs the real service, scheduler, store and worker conversations in a simulated world of
-/// crashes, broken connections, partitions, jumping clocks, full and failing disks, torn writes and
-/// power failures, all from one seed. Checks invariants after each event. Throws Violation (or
+/// Runs the real service, scheduler, store and worker conversations in a simulated world. One seed
+/// determines all faults: crashes, broken connections, partitions, jumping clocks, full and failing
+/// disks, torn writes and power failures. Checks invariants after each event. Throws Violation (or
 /// std::logic_error from an invariant) if: an acknowledged result was not committed, a point was
 /// stored twice, a store lost more than a power failure may cause, an acknowledged study or change
 /// is missing, a study is not complete at the end, a row is wrong or missing, a database is

@@ -66,11 +66,11 @@ class World {
   std::map<std::pair<std::int64_t, std::uint64_t>, std::function<void()>> to_come_;
 };
 
-/// Simulated ZeroMQ sockets over TCP. Messages arrive in order and complete until a connection
-/// breaks. Then all messages in transit are lost, and the peer reconnects with another identity. A
-/// half-open connection loses messages before it breaks. A partition separates several peers from
-/// the server: messages wait, because TCP repeats them, until the partition ends or the connections
-/// break. A sender may allow that a message is duplicated or reordered.
+/// Simulated ZeroMQ sockets over TCP. Until a connection breaks, its messages arrive complete and
+/// in order. A break loses all messages in transit, and the peer reconnects with another identity.
+/// A half-open connection loses messages before it breaks. A partition separates several peers from
+/// the server. Their messages wait, because TCP repeats them, until the partition ends or the
+/// connections break. A sender may allow that a message is duplicated or reordered.
 class Network {
  public:
   using ToServer = std::function<void(const std::string& identity, const std::string& frame)>;
@@ -90,7 +90,8 @@ class Network {
     return id;
   }
 
-  /// Closes the socket. Messages to it are lost; messages that it sent still arrive with `linger`.
+  /// Closes the socket. Messages to it are lost. Messages that it sent arrive only if `linger` is
+  /// true.
   void close(LinkId id, bool linger) {
     links_.erase(id);
     if (!linger) {
@@ -98,7 +99,7 @@ class Network {
     }
   }
 
-  /// Sends `frame` to the server. With `loosely` it may be duplicated or reordered.
+  /// Sends `frame` to the server. If `loosely` is true, `frame` may be duplicated or reordered.
   void send(LinkId id, const std::string& frame, bool loosely) {
     const auto found = links_.find(id);
     if (found == links_.end() || found->second.cut_up) {
@@ -160,7 +161,8 @@ class Network {
     });
   }
 
-  /// Breaks the connections of `peer`, or all, as when the server dies. The sockets then reconnect.
+  /// Breaks the connections of `peer`. Without `peer` breaks all connections, as when the server
+  /// dies. The sockets then reconnect.
   void break_links(std::optional<std::uint64_t> peer = std::nullopt) {
     for (auto& [id, link] : links_) {
       if (!peer || link.peer == *peer) {

@@ -36,7 +36,7 @@ struct ProcessState {
 };
 std::optional<ProcessState> state_of(pid_t pid) {
   const std::string stat = contents("/proc/" + std::to_string(pid) + "/stat");
-  const std::size_t name_end = stat.rfind(')');  // the name may contain `)` itself
+  const std::size_t name_end = stat.rfind(')');  // the program's name may contain `)`
   if (name_end == std::string::npos) {
     return std::nullopt;
   }

@@ -21,10 +21,10 @@ bool is_running(pid_t pid);
 /// Returns the child processes of `pid`.
 std::vector<pid_t> children_of(pid_t pid);
 
-/// Returns all processes whose environment contains the path of `folder`, of any parent.
+/// Returns all processes, of any parent, whose environment contains the path of `folder`.
 std::vector<pid_t> processes_of(const TemporaryFolder& folder);
 
-/// Variables that a program gets in addition to those of this process, or that replace them.
+/// Environment variables of a program. They extend or replace the variables of this process.
 using Environment = std::map<std::string, std::string>;
 
 /// Result of one run of a program.

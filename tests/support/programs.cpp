@@ -73,7 +73,7 @@ void Server::start(const TemporaryFolder& folder, std::vector<std::string> argum
   }
   arguments.insert(arguments.end(), {"--http", "127.0.0.1:0", "--ready-fd", "3",
                                      "--stop-with-parent", std::to_string(getpid())});
-  // A server without draining ends at once.
+  // With a drain time of 0 the server ends at once.
   Environment with_drain{{"OBLIQUE_SERVER_DRAIN", "0"}};
   for (const auto& [name, value] : environment) {
     with_drain[name] = value;

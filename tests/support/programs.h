@@ -22,8 +22,8 @@ Outcome run_oblique(const std::vector<std::string>& arguments);
 /// An `oblique-server`. The constructor waits until the server is ready.
 class Server {
  public:
-  /// Listens on loopback at ports that the system picks. They stay reserved while this object, or
-  /// one constructed from it, exists.
+  /// Listens on loopback at ports that the system picks. The ports stay reserved while this object,
+  /// or a Server constructed from it, exists.
   Server(const TemporaryFolder& folder, const std::string& database,
          const Environment& environment = {});
   /// Listens at the ports of `before`, which has ended.

@@ -54,7 +54,7 @@ class RawTcp {
   std::string receive(int flags = 0, std::size_t most = 65536) {
     std::string bytes(most, '\0');
     ssize_t count = 0;
-    do {  // the end of a child process interrupts recv() if it has a timeout
+    do {  // the end of a child process interrupts a recv() that has a timeout
       count = ::recv(number(), bytes.data(), bytes.size(), flags);
     } while (count < 0 && errno == EINTR);
     if (count < 0 && errno == EAGAIN && (flags & MSG_DONTWAIT) == 0) {

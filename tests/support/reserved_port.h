@@ -14,7 +14,7 @@ namespace oblique::test {
 
 /// A port of 127.0.0.1 that the system gives to no other program while this object exists.
 /// Connections are refused until a ZeroMQ socket of any process binds to the port by number.
-/// Several sockets may do so in turn.
+/// Several sockets may bind to the port one after another.
 class ReservedPort {
  public:
   ReservedPort() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {

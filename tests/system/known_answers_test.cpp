@@ -17,7 +17,7 @@ using solver::KnownImpact;
 /// Allowed relative error at the default step.
 constexpr double kTolerance = 3e-5;
 /// Allowed error of instants, relative to the duration. Near a minimum the force is flat, so the
-/// error of the default step moves the instant by 0.003 µs.
+/// error of the default step moves the instant of the minimum by 0.003 µs.
 constexpr double kTimeTolerance = 6e-6;
 
 /// Compares a value with a known one that is rounded to multiples of `digit`.

@@ -75,7 +75,7 @@ TEST_F(ServerAwayTest, ASignalEndsWatchingWithTheExitCodeOfTheSignal) {
     std::vector<std::unique_ptr<Process>> clients;
     for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
       clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
-      // The next client may only watch a study that exists.
+      // The study must exist before the next client watches it.
       wait_until("the study is stored", [this] {
         const std::string count = "SELECT count(*) FROM studies";
         try {

@@ -26,8 +26,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using protocol::Descriptor;
 constexpr int kLongestPoll_ms = 5;
-/// Maximum number of buffered bytes per direction; the proxy reads no more above it. It is so large
-/// that a delay does not limit the rate.
+/// Maximum number of buffered bytes per direction; a full buffer stops reading. The limit is so
+/// high that a delay does not reduce the rate.
 constexpr std::size_t kMaxUnderWay = std::size_t{4} << 20U;
 
 sockaddr_in on_loopback(std::uint16_t port) {

@@ -23,7 +23,8 @@ class TcpProxy {
 
   /// Returns the ZeroMQ address of the proxy.
   std::string url() const;
-  /// stall(true) stops forwarding. stall(false) forwards the bytes received since, and continues.
+  /// stall(true) stops forwarding. stall(false) forwards the bytes received meanwhile, and
+  /// continues.
   void stall(bool holds) { stalls_ = holds; }
   /// Drops all bytes on the present connections, and also hides their ends, so that neither side
   /// gets anything from the other. Later connections are forwarded.

@@ -36,7 +36,8 @@ std::string frame_of(std::uint64_t request_id, const protocol::QueryReply& chunk
   return protocol::encode(reply);
 }
 
-/// Answers a query with two rows, and each request for more rows with the result of `more`.
+/// Returns the answers of a server: two rows to a query, and the result of `more` to each request
+/// for more rows.
 ScriptedServer::Answer gives(
     std::function<std::vector<std::string>(std::uint64_t request_id, std::uint64_t taken)> more) {
   return [more](const protocol::ClientRequest& request) -> std::vector<std::string> {
@@ -50,7 +51,7 @@ ScriptedServer::Answer gives(
   };
 }
 
-/// Answers as a server with one study, whose state is `state`.
+/// Returns the answers of a server with one study in the state `state`.
 ScriptedServer::Answer has_study(const std::string& state) {
   return [state](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
@@ -118,7 +119,7 @@ TEST(Answers, AnAnswerThatStopsArrivingGivesExitCodeOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
-  do {  // repeats the query if the first chunk was too late
+  do {  // repeats the query if the first rows came after the timeout
     csv = run_client(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);

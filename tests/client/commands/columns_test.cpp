@@ -79,7 +79,8 @@ TEST_F(OneResult, DescriptionsCoverExactlyTheMembersOfSolveJson) {
   EXPECT_EQ(names, members_of(solved));
 }
 
-// Stored rows contain all digits of scalars, but only eight digits of numbers in lists.
+// Expects that a stored value equals a member of the JSON output. Numbers in lists are stored with
+// eight digits, other numbers with all digits.
 void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_json& member,
                  const std::string& name, bool is_in_list = false) {
   if (member.is_structured()) {

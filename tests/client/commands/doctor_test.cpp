@@ -71,7 +71,7 @@ TEST_F(Doctor, ReadsADatabaseWhoseServerWasKilled) {
   {
     server::Store store(folder_.file("data/alive.db"));
     test::add_study(store, "friction", 4, 2);
-    // Copies the open database: a killed server leaves the same files.
+    // Copies the files of the open database. A killed server leaves the same files.
     std::filesystem::copy(folder_.file("data/alive.db"), folder_.file("data/dead.db"));
     std::filesystem::copy(folder_.file("data/alive.db-wal"), folder_.file("data/dead.db-wal"));
     EXPECT_THAT(healthy({"--db", "data/alive.db"}), HasSubstr("1 study, in use by a server"));

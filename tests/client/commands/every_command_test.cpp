@@ -75,7 +75,7 @@ Words listed_in(const std::string& help) {
   while (std::getline(lines, line) && line.starts_with("  ")) {
     std::string name;
     std::istringstream(line) >> name;
-    if (line[2] != ' ') {  // else a wrapped description
+    if (line[2] != ' ') {  // other lines continue a description
       names.push_back(name);
     }
   }
@@ -291,7 +291,7 @@ TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingStudyAndExitsWit
       words = with(words, {rest.begin() + 1, rest.end()});
     }
     for (const char* flag :
-         {"--yes", "--show"}) {  // some commands require these without a terminal
+         {"--yes", "--show"}) {  // flags that some commands require without a terminal
       if (command.help.find(flag + std::string(" ")) != std::string::npos) {
         words.emplace_back(flag);
       }

@@ -114,7 +114,7 @@ TEST(Run, EstimatesErrorsOfAllPointsOrNone) {
                " FROM runs GROUP BY study ORDER BY study",
                "--format", "csv"});
   EXPECT_THAT(sql.out, HasSubstr("with,2,2,2,2\nwithout,2,0,0,0\n"));
-  // A study of the same name exists, and its definition differs.
+  // A stored study has the same name but another definition.
   const auto refused = run({"--name", "with"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.err, HasSubstr("errors: stored true, given false"));

@@ -22,8 +22,8 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// Two studies on coarse meshes, which save time: one of two models with error estimates, one with
-/// fixed steps.
+/// Two studies whose coarse meshes save time: `models` has two models and error estimates, `steps`
+/// has fixed steps.
 const std::map<std::string, const char*> kStudies{{"models", R"(name = "models"
 errors = true
 [model]
@@ -195,7 +195,7 @@ TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   }
   EXPECT_THAT(text_of("fall_here.csv"), testing::AllOf(StartsWith("t_s,"), HasSubstr(",falling,")));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
-  // `--every 50` prints each 50th instant, ends of phases and the last instant.
+  // `--every 50` prints every 50th instant, the ends of phases and the last instant.
   const auto thinned = run_trace({"models", "3", "--every", "50"});
   EXPECT_EQ(thinned.out, run_trace({"models", "3", "--every", "50", "--local"}).out);
   const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };

@@ -43,7 +43,7 @@ TEST(Richardson, FindsOrderLimitAndErrorOfAPureErrorTermExactly) {
 }
 
 TEST(Richardson, ErrorEstimateIsRightToLeadingOrderWhenAHigherTermIsPresent) {
-  // v(h) = 2 + h^2 + h^3 at h = 1/16, 1/32, 1/64: at the last h, h^3 is 1/64 of h^2.
+  // v(h) = 2 + h^2 + h^3. At the smallest step, 1/64, the third term is 1/64 of the second.
   std::vector<double> values;
   for (const double h : {1.0 / 16, 1.0 / 32, 1.0 / 64}) {
     values.push_back(2.0 + h * h + h * h * h);
@@ -162,7 +162,7 @@ TEST(ContactChanges, FindEventsThatOnlyOneLevelHas) {
 
 constexpr double kHighestOrder = 4.0;
 
-// A contact with two peaks, solved with step h: each output is its limit times 1 + h^2.
+// An invented contact with two peaks. Each output at step h is its limit times 1 + h^2.
 CaseResult second_order(double h) {
   const double factor = 1.0 + h * h;
   CaseResult result{};
@@ -233,7 +233,7 @@ TEST(Convergence, FindsOrderAndLimitOfEveryOutput) {
 }
 
 TEST(Convergence, ComparesAnOutputOnlyIfTheModesBeforeItAgree) {
-  // The coarsest mesh ends after one peak.
+  // On the coarsest mesh the contact ends after one peak.
   auto coarsest = second_order(0.2);
   coarsest.major_mode = "SC SR sR";
   coarsest.peaks.pop_back();
@@ -334,7 +334,7 @@ TEST(Convergence, OfTheExplicitStepIsOfOrderFourOnARealImpact) {
       "step",
       solve_levels(step_levels(model, 1.0, 2), {1.0, 0.4, 1.0}, line, [](const SolvedLevel&) {}));
   EXPECT_TRUE(converges(refinement));
-  // The exit speed converges last, and its error is far above rounding.
+  // The exit speed is the last output to converge. Its error is far larger than rounding errors.
   const auto& vn_out = named(refinement.convergence, "vn_out_m_s");
   EXPECT_GT(vn_out.extrapolation.order.value(), 3.8);
   EXPECT_LT(vn_out.extrapolation.error.value(), 1e-5);
@@ -406,7 +406,7 @@ TEST(Verdict, NamesOutputsThatStillChangeByMoreThanAThousandthOfTheirScale) {
   auto middle = second_order(0.05);
   coarsest.vt_out_m_s = -1.001;
   middle.vt_out_m_s = -1.0;
-  finest.vt_out_m_s = -1.005;  // changes by 0.07 % of the speed at touch, 7 m/s
+  finest.vt_out_m_s = -1.005;  // 0.005 m/s is 0.07 % of the speed at touch
   EXPECT_TRUE(converges(refinement_with({coarsest, middle, finest})));
 }
 

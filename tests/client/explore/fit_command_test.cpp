@@ -19,14 +19,14 @@ using testing::HasSubstr;
 TEST(FitCoverage, IsThatOf95PercentIntervals) {
   const auto coverage = test::fit_coverage(50, 2);
   EXPECT_EQ(coverage.fits, 50);
-  // Fewer than 42 of 50 has a probability of 0.1 % for intervals that cover in 95 %.
+  // If intervals cover the truth in 95 % of fits, the probability of fewer than 42 in 50 is 0.1 %.
   EXPECT_GE(coverage.k, 42);
   EXPECT_GE(coverage.eta2, 42);
 }
 
 class FitCommand : public ::testing::Test {
  protected:
-  /// Impacts that begin with stick or slip, solved with the preset paper, as measurements.
+  /// Writes measured.csv: impacts that begin with stick or slip, solved with the preset `paper`.
   void measure() {
     ASSERT_EQ(oblique({"run", "--H", "0.9,1", "--mu", "0.4,1.4", "--e", "1", "--preset", "paper",
                        "--name", "truth"})
@@ -65,7 +65,7 @@ TEST_F(FitCommand, FindsTheParametersOfMeasurements) {
   EXPECT_EQ(found["degrees_of_freedom"], 6);
   EXPECT_EQ(found["residuals"].size(), 8U);
   EXPECT_EQ(found["residuals"][0]["output"], "fn_peak_N");
-  // The same command finds all its points stored.
+  // All points of the second run are already stored.
   const auto again = fit(flags);
   EXPECT_EQ(again.out, first.out);
   EXPECT_THAT(again.err, HasSubstr("Continuing"));

@@ -27,12 +27,12 @@ using Eigen::VectorXd;
 
 constexpr double kRelativeDeviation = 0.01;
 
-/// Slip throughout in the first three; the others begin with stick, which depends on eta2.
+/// The first three impacts slip throughout. The others begin with stick, which depends on eta2.
 constexpr std::array<solver::Point, 5> kImpacts{
     {{0.8, 0.3, 1.0}, {0.9, 0.4, 0.9}, {1.0, 0.6, 1.0}, {1.0, 1.3, 1.0}, {0.9, 1.5, 1.0}}};
 constexpr std::size_t kOutputs = 2;
 
-/// Peak forces of all impacts with each vector of k and eta2.
+/// Returns the peak forces of all impacts for each vector (k, eta2) in `points`.
 std::vector<VectorXd> peak_forces(const std::vector<VectorXd>& points,
                                   const std::shared_ptr<solver::FallCache>& falls) {
   std::vector<solver::Finger> fingers;

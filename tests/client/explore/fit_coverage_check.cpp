@@ -1,5 +1,5 @@
-// How often the 95 % intervals of `oblique fit` cover the truth: synthetic measurements, many more
-// than a test has time for.
+// Counts how often the 95 % intervals of `oblique fit` contain the true value. Uses many more
+// synthetic measurements than a test has time for.
 #include <cstdint>
 #include <string>
 

@@ -23,7 +23,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// A problem of closed-form predictions.
+/// Returns a fit problem whose predictions are given by the formula `model`.
 template <class Model>
 FitProblem problem_of(std::vector<Unknown> unknowns, const VectorXd& measured, double sd,
                       Model model) {
@@ -42,7 +42,7 @@ FitProblem problem_of(std::vector<Unknown> unknowns, const VectorXd& measured, d
   return problem;
 }
 
-/// y_i = a + b t_i at t = 0, 1, 2, 3 with sd 0.5. Covariance of a straight line:
+/// The straight line y_i = a + b t_i with t = 0, 1, 2, 3 and sd 0.5. Its covariance is
 /// var a = sd^2 sum t^2 / D, var b = sd^2 n / D, cov = -sd^2 sum t / D, D = n sum t^2 - (sum t)^2.
 FitProblem line_problem() {
   const VectorXd measured{{1.0, 2.5, 2.0, 4.0}};
@@ -78,7 +78,7 @@ TEST(Unknown, RunsThroughItsRangeWithTheAngleAndStaysWithin) {
     }
   }
   EXPECT_DOUBLE_EQ((Unknown{"k", 1e6, 1e8, 2e7}.value_at(1.5 * M_PI)), 1e7);
-  // The cosine rounds to 2e-16, times half the range of 6.
+  // The cosine has a rounding error of 2e-16. It is multiplied by 3, half of the range.
   EXPECT_NEAR((Unknown{"x", -2.0, 4.0, 0.0}.value_at(1.5 * M_PI)), 1.0, 1e-14);
 }
 
@@ -95,7 +95,7 @@ TEST(Fit, OfAStraightLineHasTheCovarianceOfLinearRegression) {
   EXPECT_NEAR(found.unknowns[1].sd, sd_b, 1e-4);
   EXPECT_NEAR(found.correlation(0, 1), -6.0 / std::sqrt(14.0 * 4.0), 1e-4);
   EXPECT_EQ(found.degrees_of_freedom, 2U);
-  // Of a linear problem the profile is the parabola of the covariance.
+  // For a linear problem the profile of chi2 is the parabola that the covariance gives.
   EXPECT_NEAR(found.unknowns[0].estimate.from, a - 1.95996 * sd_a, 0.01 * sd_a);
   EXPECT_NEAR(found.unknowns[1].estimate.to, b + 1.95996 * sd_b, 0.01 * sd_b);
   EXPECT_THAT(found.combinations, IsEmpty());
@@ -115,7 +115,7 @@ TEST(Fit, ScalesDeviationsAndIntervalsByChi2WhereAsked) {
 
 TEST(Fit, OfADecayAgreesWithTheCovarianceOfItsDerivatives) {
   const Fit found = fit(decay_problem(0.01));
-  // J of a exp(-rate t) by hand.
+  // Analytic Jacobian of a exp(-rate t), divided by the sd.
   const auto t = Eigen::ArrayXd::LinSpaced(12, 0.0, 3.0);
   const double a = found.unknowns[0].estimate.value;
   Eigen::MatrixXd jacobian(12, 2);
@@ -141,17 +141,17 @@ TEST(Minimise, FindsTheMinimumOfRosenbrocksFunction) {
 
 TEST(Fit, KeepsAnUnknownAtABoundBehindWhichTheMinimumIs) {
   auto problem = line_problem();
-  problem.unknowns[1] = {"b", 1.5, 5.0, 2.0};  // without the bound: 0.85
+  problem.unknowns[1] = {"b", 1.5, 5.0, 2.0};  // without the bound, b would be 0.85
   const Fit found = fit(problem);
   EXPECT_TRUE(found.unknowns[1].is_at_bound);
   EXPECT_NEAR(found.unknowns[1].estimate.value, 1.5, 1e-3);
   EXPECT_TRUE(std::isnan(found.unknowns[1].sd));
   EXPECT_TRUE(std::isnan(found.unknowns[1].estimate.from));
-  // With b = 1.5 a is the mean of y - 1.5 t, with sd 0.5 / sqrt(4).
+  // At b = 1.5, a is the mean of y - 1.5 t; its sd is 0.5 / sqrt(4).
   EXPECT_NEAR(found.unknowns[0].estimate.value, (9.5 - 9.0) / 4.0, 2e-3);
   EXPECT_NEAR(found.unknowns[0].sd, 0.25, 1e-3);
-  // The profile over b is the parabola around 0.85; its end is where it has risen by 3.84
-  // since 1.5.
+  // The profile over b is a parabola around 0.85. The interval ends where the profile is 3.84
+  // higher than at b = 1.5.
   const double variance = 0.25 * 4.0 / 20.0;
   const double end = 0.85 + std::sqrt((1.5 - 0.85) * (1.5 - 0.85) + 3.84 * variance);
   EXPECT_NEAR(found.unknowns[1].estimate.to, end, 0.01);
@@ -171,7 +171,8 @@ TEST(Fit, NamesUnknownsOfWhichOnlyTheProductIsDetermined) {
   EXPECT_TRUE(std::isnan(found.unknowns[0].sd));
   EXPECT_FALSE(std::isnan(found.unknowns[2].sd));
   EXPECT_NEAR(found.unknowns[0].estimate.value * found.unknowns[1].estimate.value, 2.02, 0.05);
-  // a b is about 2, and b at most 10: a is at least 0.2, and no upper end is within its bound.
+  // The product a b is about 2 and b is at most 10, so a is at least 0.2. The interval of a has no
+  // upper end below the bound of a.
   EXPECT_NEAR(found.unknowns[0].estimate.from, 0.2, 0.02);
   EXPECT_TRUE(std::isnan(found.unknowns[0].estimate.to));
 }
@@ -203,7 +204,7 @@ TEST(Fit, NamesAPairThatIsNearlyEquivalent) {
 }
 
 TEST(Fit, HasAsymmetricIntervalsWhereTheModelIsCurved) {
-  // chi2 = ((x^2 - 1) / 0.5)^2 rises by 3.84 where x^2 = 1 -+ 0.98.
+  // chi2 = ((x^2 - 1) / 0.5)^2 is 0 at x = 1 and 3.84 at x^2 = 1 -+ 0.98.
   const auto problem = problem_of({{"x", 0.01, 10.0, 3.0}}, VectorXd{{1.0}}, 0.5,
                                   [](const VectorXd& p) { return VectorXd{{p[0] * p[0]}}; });
   const Fit found = fit(problem);
@@ -225,7 +226,7 @@ TEST(Fit, EndsAnIntervalWhereTheModelLacksAMeasuredOutput) {
 }
 
 TEST(Fit, StartsAgainWhereAProfileFindsASmallerChi2) {
-  // Minima near x = -1, where chi2 is about 0.09, and at x = 1.5, where it is 0; 0.36 between them.
+  // chi2 has minima near x = -1 (about 0.09) and at x = 1.5 (0). Between them it rises to 0.36.
   const auto problem =
       problem_of({{"x", -4.0, 4.0, -1.2}}, VectorXd::Zero(2), 1.0, [](const VectorXd& p) {
         return VectorXd{{0.338 * (p[0] + 1.0) * (p[0] - 1.5), 0.12 * (p[0] - 1.5)}};
@@ -248,7 +249,7 @@ TEST(Fit, EndsAnIntervalWhereChi2JumpsOverTheLimit) {
 }
 
 TEST(Fit, ReachesTheLeastOfSeveralMinimaFromAWrongStart) {
-  // The period of a sine has many local minima.
+  // chi2 has many local minima as a function of the frequency w.
   const Eigen::ArrayXd t = Eigen::ArrayXd::LinSpaced(20, 0.0, 1.0);
   const auto model = [t](const VectorXd& p) { return VectorXd((p[0] * t).sin().matrix()); };
   const auto problem = problem_of({{"w", 0.0, 50.0, 1.5}}, model(VectorXd{{25.0}}), 0.1, model);
@@ -264,7 +265,8 @@ TEST(Fit, SearchesAllEndsSideBySide) {
     sizes.push_back(points.size());
     return evaluate(points, what);
   };
-  // A point with both differences of two unknowns: 16 starts, then one, then four ends.
+  // With two unknowns an iteration evaluates a point and four finite differences: 5 points. The fit
+  // begins at 16 starts (80 points) and finally searches four interval ends (20 points).
   const auto iterations = static_cast<std::size_t>(minimise(problem, problem.start()).iteration);
   EXPECT_THAT(sizes, testing::Each(5U));
   EXPECT_LE(sizes.size(), iterations + 2);

@@ -71,7 +71,7 @@ TEST(MapCommand, JsonAndCsvHaveTheSameVerticesAndAPictureIsBesideTheTable) {
   }
   EXPECT_THAT(ran.out, HasSubstr("smaller than a cell, 0.244 in mu by 0.0938 in H, may be missed"));
   const auto map = nlohmann::json::parse(file_text(folder.file("map.json")));
-  // The table lists the six regions with at least 0.25 %.
+  // The table lists the six regions with at least 0.25 % of the area.
   EXPECT_THAT(ran.out, HasSubstr(std::to_string(map["regions"].size() - 6) + " other regions"));
   const auto csv = file_text(folder.file("map.csv"));
   EXPECT_TRUE(csv.starts_with("x,y,from,to,width,along\n")) << csv.substr(0, 100);
@@ -129,7 +129,7 @@ TEST(MapCommand, TakesModelAndSingleValuesOfAStudyAndLevelsOfAnOutput) {
   EXPECT_THAT(ran.out, HasSubstr("stick_total_s > 0"));
   EXPECT_THAT(ran.out, HasSubstr("stick_total_s <= 0"));
   const test::Database database(folder.file("oblique.db"));
-  // The second is the finer mesh.
+  // The map also solves points on a finer mesh, which is the second model.
   EXPECT_EQ(database.numbers("SELECT count(DISTINCT model_id) FROM results").front(), 2.0);
   EXPECT_EQ(database.numbers("SELECT count(DISTINCT H) FROM results").front(), 1.0);
   const auto varying = test::run_oblique(folder, {"map", "base", "--x", "e=0.5:1", "--y", "H=0.5:1",

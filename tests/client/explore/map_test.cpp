@@ -16,7 +16,7 @@
 namespace oblique::client {
 namespace {
 
-/// The region at a point of the unit square.
+/// Returns the number of the region that contains the point (x, y) of the unit square.
 using Regions = std::function<int(double x, double y)>;
 
 constexpr double kBracket = 1e-6;
@@ -75,7 +75,8 @@ int waves(double x, double y) {
   return static_cast<int>(std::floor(3.0 * x + 2.0 * std::sin(4.0 * y))) + 3;
 }
 
-/// A vertex in the unit square: the end of its bracket at that step.
+/// Returns a point of the vertex's bracket in the unit square: the lower end for `step` 0, the
+/// upper end for `step` 1.
 std::pair<double, double> place_of(const BorderVertex& vertex, double step, const MapGrid& grid) {
   return {(vertex.low.x + (vertex.is_along_x ? step : 0.0)) / grid.last(),
           (vertex.low.y + (vertex.is_along_x ? 0.0 : step)) / grid.last()};
@@ -108,7 +109,7 @@ TEST(FindBorders, ADiscHasOneClosedCurveOfItsLengthAndArea) {
     const auto b = place_of(borders.vertices[curve[i]], 0.5, solver.grid);
     length += std::hypot(a.first - b.first, a.second - b.second);
   }
-  // Chords of length h are shorter than their arcs by a part (h/r)^2/24.
+  // A chord of length h is shorter than its arc; the relative difference is (h/r)^2/24.
   const double h = std::sqrt(2.0) / solver.grid.cells;
   EXPECT_NEAR(length, 2.0 * std::numbers::pi * 0.3,
               2.0 * std::numbers::pi * 0.3 * std::pow(h / 0.3, 2) / 24.0);
@@ -164,8 +165,8 @@ TEST(FindBorders, RasterCellsAreInTheRegionsThatTheCurvesSay) {
       const double y = (static_cast<double>(i / Borders::kRaster) + 0.5) / Borders::kRaster;
       wrong += borders.raster[i] != regions(x, y) ? 1 : 0;
     }
-    // Chords of length h are at most h^2/8 times the curvature, here 8, from their arcs, on
-    // borders with a length of at most 10.
+    // A chord of length h is at most h^2/8 times the curvature away from its arc. The curvature is
+    // at most 8, and the borders are at most 10 long.
     const double h = std::sqrt(2.0) / solver.grid.cells;
     EXPECT_LT(wrong, static_cast<double>(borders.raster.size()) * 10.0 * 8.0 * h * h / 12.0);
   }

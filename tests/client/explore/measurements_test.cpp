@@ -40,11 +40,11 @@ TEST(Measurements, AreNumbersWithDeviationsUnderTheConditionsOfTheirRow) {
                           Pair("E", ElementsAre(7e10, 6e10))));
   ASSERT_EQ(found.outputs.size(), 2U);
   EXPECT_EQ(found.outputs[1], "duration_s");
-  ASSERT_EQ(found.numbers.size(), 3U);  // an empty field was not measured
+  ASSERT_EQ(found.numbers.size(), 3U);  // an empty field is no measurement
   EXPECT_EQ(found.numbers[0].value, 5058.0);
   EXPECT_EQ(found.numbers[0].sd, 50.0);
   EXPECT_EQ(found.numbers[1].row, 1U);
-  EXPECT_DOUBLE_EQ(found.numbers[1].sd, 47.0);  // 1 %, for the file has none
+  EXPECT_DOUBLE_EQ(found.numbers[1].sd, 47.0);  // 1 %, because the field of its sd is empty
   EXPECT_EQ(found.numbers[2].output, 1U);
   EXPECT_DOUBLE_EQ(found.numbers[2].sd, 5e-6);
   EXPECT_EQ(found.numbers[2].name, "measured.csv:3: duration_s");

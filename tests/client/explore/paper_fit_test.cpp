@@ -24,7 +24,7 @@ TEST(PaperFit, OfWhatThePaperDoesNotPrintEndsWithinOnePercentOfThePreset) {
   }
   EXPECT_EQ(end.residuals.size(), 63);
   EXPECT_TRUE((end.predictions.array() > 0.0).all());
-  // The numbers are printed with two or three digits; their rounding alone gives 0.6 % rms.
+  // The paper prints numbers with two or three digits. This rounding alone causes 0.6 % rms.
   EXPECT_LT(std::sqrt(end.chi2 / 63.0), 0.6);
   ASSERT_GT(trials.size(), 1U);
   EXPECT_EQ(trials.front(), "start");

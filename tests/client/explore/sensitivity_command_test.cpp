@@ -74,7 +74,7 @@ TEST(Sensitivity, ContinuesWhatIsStoredAndOtherOutputsCostNoPoint) {
 
 TEST(Sensitivity, RowsWithFailedPointsAreLeftOutAndCounted) {
   const test::TemporaryFolder folder;
-  // The tip turns back after a drop of about 1.18 m: some points fail.
+  // Some points fail, because the tip turns back after a fall of about 1.18 m.
   const auto outcome = test::run_oblique(
       folder,
       {"sensitivity", "--H",         "0.9:1.19", "--mu",       "0.4",        "--e",      "0.5:1",

@@ -18,7 +18,7 @@ namespace {
 /// A function on the unit cube.
 using Function = std::function<double(std::span<const double> u)>;
 
-/// A function with its indices, which are known.
+/// A function with known sensitivity indices.
 struct KnownFunction {
   Function f;
   std::vector<double> first;
@@ -71,7 +71,7 @@ KnownFunction g_function(const std::vector<double>& a) {
   return g;
 }
 
-/// The outputs of a function at the points of coordinates, `inputs` each.
+/// Returns the outputs of `f`. `coordinates` contains `inputs` coordinates for each point.
 std::vector<double> outputs_at(const Function& f, std::span<const double> coordinates,
                                std::size_t inputs) {
   std::vector<double> outputs;
@@ -81,7 +81,7 @@ std::vector<double> outputs_at(const Function& f, std::span<const double> coordi
   return outputs;
 }
 
-/// The outputs of a function at the points of rows 0, 1, ... of a design.
+/// Returns the outputs of `f` at the points of the first `rows` rows of a design.
 std::vector<double> outputs_of(const Function& f, decltype(saltelli_row)& design,
                                std::size_t inputs, std::uint64_t seed, std::uint64_t rows) {
   std::vector<double> outputs;
@@ -150,16 +150,16 @@ TEST(SobolIndicesTest, IntervalsShrinkAsTheSquareRootOfTheRows) {
   }
 }
 
-// Random rows instead of Sobol's: the bootstrap's assumption holds, so its intervals must miss
-// about 5 %. 400 designs x 6 indices that depend on each other; 120 misses are expected, and
-// fewer than 50 or more than 260 would be another method.
+// Random rows satisfy the bootstrap's assumption, unlike Sobol's rows. So the intervals must miss
+// about 5 % of the indices: 120 of 400 designs x 6 indices. The limits of 50 and 260 are wide,
+// because the indices of a design depend on each other.
 TEST(SobolIndicesTest, IntervalsCoverTheIndicesOfRandomRowsAsOftenAsTheySay) {
   const auto known = ishigami();
   int misses = 0;
   for (std::uint64_t seed = 0; seed < 400; ++seed) {
     std::vector<double> outputs;
     for (std::uint64_t row = 0; row < 256; ++row) {
-      // Any row of another scrambling is a random one, independent of the rest.
+      // Row 0 of another scrambling is an independent random row.
       const auto some = outputs_at(known.f, saltelli_row(3, 1000 * seed + row, 0), 3);
       outputs.insert(outputs.end(), some.begin(), some.end());
     }
@@ -178,8 +178,8 @@ TEST(SobolIndicesTest, ARowWithAFailedPointIsDroppedWholeAndCounted) {
   auto outputs = sobol_outputs(known.f, 3, 1, 64);
   std::vector<double> without(outputs.begin() + 5, outputs.end());
   without.erase(without.begin() + 5 * 30, without.begin() + 5 * 31);
-  outputs[3] = kNaN;                                          // A_B^2 of row 0
-  outputs[5 * 31] = std::numeric_limits<double>::infinity();  // A of row 31
+  outputs[3] = kNaN;                                          // the point A_B^2 of row 0
+  outputs[5 * 31] = std::numeric_limits<double>::infinity();  // the point A of row 31
   const auto dropped = sobol_indices(outputs, 3, 1);
   const auto never = sobol_indices(without, 3, 1);
   EXPECT_EQ(dropped.rows, 62U);
@@ -239,12 +239,12 @@ TEST(MorrisTest, TheEffectsOfALinearFunctionAreItsCoefficients) {
     EXPECT_NEAR(effects.measures[2].of_inputs[i].value, slopes[i], 1e-12);
     EXPECT_NEAR(effects.measures[0].of_inputs[i].value, std::abs(slopes[i]), 1e-12);
     EXPECT_NEAR(effects.measures[0].of_inputs[i].half_width(), 0.0, 1e-12);
-    EXPECT_NEAR(effects.measures[1].of_inputs[i].value, 0.0, 1e-6);  // a root of rounding
+    EXPECT_NEAR(effects.measures[1].of_inputs[i].value, 0.0, 1e-6);  // root of a rounding error
   }
 }
 
-// f = u1 (u2 - 1/2): the effect of u1 is u2 - 1/2, with mean 0; on the eight levels its variance is
-// (8^2 - 1)/12/8^2 and the mean of its magnitude 1/4.
+// f = u1 (u2 - 1/2). The effect of u1 is u2 - 1/2, and its mean is 0. On the eight levels its
+// variance is (8^2 - 1)/12/8^2, and the mean of its magnitude is 1/4.
 TEST(MorrisTest, AnInteractionHasADeviationWhereItsMeanIsZero) {
   const auto product = [](std::span<const double> u) { return u[0] * (u[1] - 0.5); };
   const auto effects = morris_effects(morris_outputs(product, 2, 1, 4000), 2, 1);
@@ -257,7 +257,7 @@ TEST(MorrisTest, AnInteractionHasADeviationWhereItsMeanIsZero) {
 }
 
 TEST(MorrisTest, EachInputChangesOnceByHalfTheCubeAndTakesAllLevels) {
-  constexpr std::size_t kInputs = 20;  // more than Saltelli's design can have
+  constexpr std::size_t kInputs = 20;  // more inputs than Saltelli's design allows
   std::set<double> levels;
   for (std::uint64_t number = 0; number < 64; ++number) {
     const auto points = morris_trajectory(kInputs, 2, number);

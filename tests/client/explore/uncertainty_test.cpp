@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-/// Draws `first`, `first` + 1, ... of a random sequence in (0, 1).
+/// Returns `n` random numbers in (0, 1).
 std::vector<double> uniform_draws(std::size_t n, std::uint64_t seed) {
   protocol::Sample random;
   random.set_kind(protocol::SAMPLE_RANDOM);
@@ -37,7 +37,8 @@ bool covers(const Estimate& estimate, double truth) {
   return estimate.from <= truth && truth <= estimate.to;
 }
 
-// 2000 intervals of 95 %: 1900 cover, with a deviation of 10. Six of them on either side.
+// Of 2000 intervals of 95 %, 1900 are expected to cover the true value, with a standard deviation
+// of 10. The tests allow six deviations.
 constexpr int kIntervals = 2000;
 constexpr double kExpected = 1900.0;
 constexpr double kSlack = 60.0;
@@ -68,7 +69,8 @@ TEST(QuantileTest, ItIsInterpolatedBetweenTheValuesAround) {
   EXPECT_TRUE(std::isnan(quantile_of({}, 0.5).value));
 }
 
-// Tables of order statistics: for the median of 20 values the sixth and the fifteenth.
+// According to tables of order statistics, the interval of the median of 20 values is from the 6th
+// to the 15th value.
 TEST(QuantileTest, ItsIntervalIsThatOfOrderStatistics) {
   std::vector<double> rising;
   for (int i = 1; i <= 20; ++i) {
@@ -90,7 +92,8 @@ TEST(QuantileTest, IntervalsCoverTheQuantileOfAnyDistribution) {
       std::sort(draws.begin(), draws.end());
       covered += covers(quantile_of(draws, p), p) ? 1 : 0;
     }
-    EXPECT_GE(covered, kExpected - kSlack) << p;  // binomial steps make them rather too wide
+    // Ranks are integers, so the intervals are rather too wide.
+    EXPECT_GE(covered, kExpected - kSlack) << p;
     EXPECT_LE(covered, kExpected + kSlack) << p;
   }
 }

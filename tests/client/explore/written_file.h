@@ -6,7 +6,7 @@
 
 namespace oblique::client {
 
-/// The bytes of a file that a command wrote; empty if there is none.
+/// Returns the bytes of a file that a command wrote; empty if the file does not exist.
 inline std::string text_in_file(const std::string& name) {
   std::ifstream file(name, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};

@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-// Two published cases: one with two peaks, two phases and a stick time, one without numbers.
+// Two published cases: one has two peaks, two phases and a stick time; the other has no numbers.
 PublishedTable small_table() {
   PublishedCase counted;
   counted.H_m = 1.0;
@@ -77,8 +77,8 @@ TEST(Comparison, IgnoresPhasesOfARowFromTheFirstRippleOn) {
 TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
   using solver::PhaseKind;
   solver::CaseResult result{};
-  // The force turns at 4000, 100, 200, 150, 1000 N; the peak of 200 N and the valley of 150 N form
-  // a ripple.
+  // The force has extrema of 4000, 100, 200, 150 and 1000 N. The peak of 200 N and the valley of
+  // 150 N form a ripple.
   result.phases = {
       {PhaseKind::kCompression, 0.0, 1.0, 4000.0}, {PhaseKind::kRestitution, 1.0, 3.0, 100.0},
       {PhaseKind::kCompression, 3.0, 4.0, 200.0},  {PhaseKind::kRestitution, 4.0, 5.0, 150.0},

@@ -20,7 +20,8 @@ const std::vector<PaperFigure>& figures() {
   return all;
 }
 
-/// Returns the published numbers of a panel, which are drawn as diamonds; empty if it has none.
+/// Returns the curve of a panel's published numbers, drawn as diamonds; an empty curve if the panel
+/// has none.
 plot::Curve published_in(const plot::Panel& panel) {
   return panel.curves.back().mark == plot::Curve::Mark::kDiamonds ? panel.curves.back()
                                                                   : plot::Curve{};
@@ -34,8 +35,7 @@ std::size_t published_in(const PaperFigure& figure) {
   return count;
 }
 
-/// Returns the smallest difference in y between the point (x, y) and a line of the panel, as a
-/// share of y.
+/// Returns the smallest relative difference in y between the point (x, y) and a line of the panel.
 double nearest_share(const plot::Panel& panel, double x, double y) {
   double nearest = 1e9;
   for (const auto& curve : panel.curves) {
@@ -64,7 +64,7 @@ TEST(PaperFigures, AreFigures3To7WithTheGroupsOfThePaper) {
 TEST(PaperFigures, MarkEveryPublishedNumberOfTheirGroups) {
   EXPECT_EQ(published_in(figures()[0]), 9U);   // three peaks at each of three e*
   EXPECT_EQ(published_in(figures()[1]), 60U);  // 30 peaks of F_n and 30 of F_t
-  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases; 6 are in three panels each
+  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases: 6 in one panel, 6 in three each
   EXPECT_EQ(published_in(figures()[3]), 3U);   // ends of stick
   EXPECT_EQ(published_in(figures()[4]), 0U);   // nothing is published
 }

@@ -130,7 +130,8 @@ inline Figure named_bars(const std::string& name = "SC sR") {
   return figure_with(std::move(panel));
 }
 
-/// Two panels: forces with spans, a gap and a published number; a shape with equal x and y scales.
+/// Two panels: one shows forces with spans, a gap and a published number; the other shows a shape
+/// with equal scales of x and y.
 inline Figure panels() {
   Panel forces;
   forces.title = "Forces";

@@ -91,7 +91,8 @@ TEST(PointEnergies, AreLostByPOrStoredInTheElement) {
   // During stick both contact elements are springs with energy force * deformation / 2.
   const auto& stuck = history.rows[5];
   EXPECT_NEAR(element[5], 0.5 * stuck.fn_N * (-stuck.uy_m - stuck.ux_m), 1e-12);
-  // At the end the tangential spring has no energy, and the normal one has lost 1 - e*^2 of it.
+  // At the end the tangential spring has no energy. The normal element has lost the share 1 - e*^2
+  // of its energy.
   EXPECT_NEAR(element.back(), 0.5 * 1000.0 * 1e-4 * (1.0 - 0.25), 1e-12);
   EXPECT_GT(friction.back(), 0.0);
   EXPECT_DOUBLE_EQ(curves[0].y.back(), -1.0);

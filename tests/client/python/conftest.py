@@ -25,8 +25,8 @@ def without_time(result):
     return {**result, "solver": {**result["solver"], "wall_s": None}}
 
 
-#: Beginning of scripts that work without end until a test interrupts them. The alarm ends a script
-#: that was not interrupted.
+#: Beginning of scripts that run until a test interrupts them. The alarm ends a script that is not
+#: interrupted.
 BEGINNING = """
 import os, signal, sys, threading
 signal.alarm(1000)

@@ -36,7 +36,7 @@ def test_ctrl_c_ends_work_with_keyboard_interrupt(work, database):
     assert process.returncode in (-signal.SIGINT, 130)
 
 
-#: Delays the end of Python, so that other threads have time to take its global lock.
+#: Delays the end of Python, so that other threads have time to take the global lock of Python.
 ENDS_LATE = """
 import time
 class EndsLate:

@@ -115,7 +115,8 @@ TEST(Connection, SendsARequestAgainIfTheServerDied) {
     }
     return true;
   };
-  // With such long timeouts only a new connection causes the client to send the request again.
+  // The timeouts are longer than this test, so only a new connection causes the client to send the
+  // request again.
   Connection connection(
       {.server_url = port.url(), .timeout_ms = kLong_ms, .resend_after_ms = kLong_ms},
       replace_when_taken);
@@ -168,7 +169,7 @@ TEST(Connection, ReportsSilenceAndTheNextAnswer) {
           port.url());
     }
   };
-  // The server starts only after this timeout of 10 ms.
+  // The timeout of 10 ms ends before the server starts.
   Connection connection(at(port.url(), 10));
   EXPECT_EQ(connection.status("", tell).at(0).points(), 5U);
   ASSERT_EQ(sentences.size(), 2U);
@@ -192,7 +193,7 @@ TEST(Connection, ReportsAQueryThatTheServerHasNotFinishedInTime) {
       return std::vector{still_working(request, runs)};
     });
     std::string message;
-    do {  // repeats the query if the server's message was too late
+    do {  // repeats the query if the message came after the timeout
       Connection connection(at(server.url(), 500));
       try {
         connection.query("SELECT 1");

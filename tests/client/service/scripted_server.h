@@ -18,7 +18,7 @@ namespace oblique::client {
 /// connections, as a kill of the process does.
 class ScriptedServer {
  public:
-  /// Returns the replies to a request; if it returns none, the request is ignored.
+  /// Returns the replies to a request; none if the server ignores the request.
   using Answer = std::function<std::vector<std::string>(const protocol::ClientRequest&)>;
 
   explicit ScriptedServer(Answer answer, const std::string& endpoint = "tcp://127.0.0.1:*")
@@ -53,7 +53,7 @@ class ScriptedServer {
         }
       }
     } catch (const zmq::error_t&) {
-      // The destructor has shut down the context, which waits until the socket is closed.
+      // The destructor has shut down the context, and waits until this thread closes the socket.
       socket_.close();
     }
   }

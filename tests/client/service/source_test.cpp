@@ -28,7 +28,7 @@
 namespace oblique::client {
 namespace {
 
-/// Runs tests in a temporary current folder, without OBLIQUE_SERVER at first.
+/// Runs each test in a temporary folder. OBLIQUE_SERVER is not set when a test starts.
 class SourceTest : public ::testing::Test {
  protected:
   SourceTest() {

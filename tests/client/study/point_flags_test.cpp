@@ -22,7 +22,7 @@ using protocol::BlockKind;
 using testing::HasSubstr;
 using testing::StartsWith;
 
-/// The flags of one point; `axes` replaces or adds some.
+/// Returns the flags of one point; `axes` replaces or adds axes.
 PointFlags flags_of(const std::map<std::string, std::string>& axes) {
   PointFlags flags;
   flags.axes = {{"H", "1"}, {"mu", "0.4"}, {"e", "1"}};

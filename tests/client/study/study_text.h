@@ -9,7 +9,7 @@ namespace oblique::client {
 
 inline const std::string kPoint = "[[block]]\nH = 1\nmu = 0.4\ne = 1\n";
 
-/// A block of one point in which `line` replaces a line or is added.
+/// Returns a block of one point in which `line` replaces the line of its key: H, mu or e.
 inline std::string block_with(const std::string& line) {
   std::string text = "[[block]]\n";
   for (const std::string key : {"H = 1\n", "mu = 0.4\n", "e = 1\n"}) {
@@ -18,7 +18,7 @@ inline std::string block_with(const std::string& line) {
   return text;
 }
 
-/// Parses the text of a study file. Falls are not solved but invented.
+/// Parses the text of a study file. Uses an invented largest drop instead of solving falls.
 inline Study parsed(const std::string& text, const std::string& file = "x.toml") {
   return parse_study(text, file, fake_reach());
 }

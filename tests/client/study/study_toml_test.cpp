@@ -62,7 +62,8 @@ class DrawnRecipe {
     return model;
   }
 
-  /// Draws an axis: in samples a list or a distribution, elsewhere a list, range or expression.
+  /// Draws an axis: a list or distribution in a sample; a list, range or expression in other
+  /// blocks.
   protocol::Axis axis(const std::string& name, BlockKind kind, double from, double to) {
     const auto& key = protocol::axis_key(name);
     if (chance(0.3)) {

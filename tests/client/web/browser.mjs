@@ -121,7 +121,7 @@ export class Browser {
   }
 }
 
-/** Repeats `look` in the tab until it returns a value; returns the value. Ignores exceptions. */
+/** Calls `look` in the tab until it returns a value, and returns the value. Ignores exceptions. */
 export async function until(page, look, ...given) {
   let cause;
   for (const end = Date.now() + hangMs; Date.now() < end;) {

@@ -1,7 +1,7 @@
-// Measures the time from a click to the painted picture: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]. The
-// script copies FILE.db before use; PAGE is the address of a server, with its token. It shows the largest study of which at
-// least a tenth is solved. PARTs are opening, modes, scatter, slider and large (default: all). OBLIQUE_FIGURES=FILE also
-// stores the times as JSON.
+// Measures the time from a click to the painted picture. Usage: run BINARIES MODULES measure.mjs FILE.db|PAGE [PART...]
+// The script copies FILE.db before use. PAGE is the address of a server, with its token. The script opens the largest
+// study of which at least a tenth is solved. PARTs are opening, modes, scatter, slider and large (default: all).
+// OBLIQUE_FIGURES=FILE also stores the times as JSON.
 import { constants, copyFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { Browser, Server, until } from "./browser.mjs";

@@ -115,7 +115,7 @@ test("the command of a form submits the same study as the form: model and sample
   assert.equal(points(web.server.database), points(other));
 });
 
-/** Replaces the server in a tab by a fake one with many studies, whose events a test sends. */
+/** Replaces the server in a tab by a fake server with many studies. The test sends its events. */
 function manyStudies() {
   const real = window.fetch;
   const study = {

@@ -119,8 +119,8 @@ export const slideTo = (page, selector, value) =>
   );
 
 /**
- * Drags the mouse between two positions in an element. A position is a share of the element's size,
- * in maps of the area within the margins.
+ * Drags the mouse between two positions in an element. A position is a fraction of the element's
+ * size; in maps, a fraction of the area within the margins.
  */
 export async function drag(page, selector, [x0, y0], [x1, y1]) {
   const box = await (await page.waitForSelector(selector)).boundingBox();

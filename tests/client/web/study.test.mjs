@@ -217,7 +217,7 @@ test("all modules are preloaded, and no others", async () => {
     const links = [...document.querySelectorAll("link[rel=modulepreload]")];
     const found = new Set(["/main.js"]);
     for (const module of found) {
-      const text = await (await fetch(module)).text(); // this loop adds to `found`
+      const text = await (await fetch(module)).text(); // the outer loop also visits added modules
       for (const [, wanted] of text.matchAll(/ from "([^"]+)";$/gm)) {
         found.add(new URL(wanted, `${location.origin}${module}`).pathname);
       }

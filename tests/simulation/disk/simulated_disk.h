@@ -49,8 +49,8 @@ struct Found {
   std::uint64_t starts = 0;  ///< number of server starts, including this one
 };
 
-/// A simple model of the contents that a store must have, with which the real store is compared.
-/// Throws Violation if they differ.
+/// A simple model of the contents that the store must have. Throws Violation if the real contents
+/// differ.
 class StoreModel {
  public:
   using Rows = std::map<std::uint64_t, std::shared_ptr<const protocol::PointResult>>;
@@ -71,14 +71,14 @@ class StoreModel {
       entries_.push_back({{changes.begin(), changes.end()}, true});
     }
   }
-  /// Adds changes whose commit failed. Until other changes are written in their place, a crash may
-  /// bring them back, all or none.
+  /// Adds changes whose commit failed. After a crash either all or none of them may be stored,
+  /// until a later commit overwrites them.
   void refused(std::span<const server::Change> changes) {
     ++failed_commits;
     entries_.push_back({{changes.begin(), changes.end()}, false});
   }
 
-  /// Records a commit with a full sync of data that this model does not contain.
+  /// Records a full sync, which makes all stored changes durable.
   void synced() {
     synced_ = now_;
     entries_.clear();
@@ -88,7 +88,7 @@ class StoreModel {
   /// commits since the last full sync may be missing. The contents found become the state of the
   /// model.
   void restarted(const Found& found, bool power_was_lost) {
-    // Without a power failure only changes refused since the last commit are uncertain.
+    // Without a power failure only changes that were refused after the last commit are uncertain.
     const auto last_stored =
         std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& e) { return e.stored; });
     auto entry = power_was_lost ? entries_.begin() : last_stored.base();
@@ -185,7 +185,7 @@ class StoreModel {
     std::vector<server::Change> changes;
     bool stored;
   };
-  /// Applies a change; returns true if the store has to write for it.
+  /// Applies a change. Returns true if the store must write the change.
   static bool apply(const server::Change& change, Contents& contents) {
     if (const auto* study = std::get_if<AddStudy>(&change)) {
       contents.last_study_id = std::max(contents.last_study_id, study->study_id);
@@ -296,8 +296,8 @@ inline const std::string& empty_database() {
 /// Content of the database file that the first server finds.
 enum class DiskAtFirst { kEmptyDatabase, kEmptyFile };
 
-/// The real store on simulated files. Each restart compares the store with a model. After a commit
-/// the caller must check whether the process died during it.
+/// The real store on simulated files. Each restart compares the store with a model. After each
+/// commit the caller must check whether the process died during the commit.
 class SimulatedDisk final : public server::Storage {
  public:
   explicit SimulatedDisk(World& world, DiskAtFirst at_first = DiskAtFirst::kEmptyDatabase)
@@ -325,7 +325,7 @@ class SimulatedDisk final : public server::Storage {
     model_.synced();
     return found;
   }
-  /// Closes the store, as a server does that ends normally.
+  /// Closes the store, as a server does when it ends normally.
   void close() { store_.reset(); }
   /// Kills the server or cuts the power. Allowed without a running server.
   void crash(bool power_is_lost) {
@@ -419,7 +419,7 @@ class SimulatedDisk final : public server::Storage {
   World& world_;
   SimulatedFiles files_;
   StoreModel model_;
-  bool power_was_lost_ = false;  // after the store was last opened
+  bool power_was_lost_ = false;  // since the last open()
   int checkpoint_pages_;
   std::uint64_t starts_ = 0;
   std::unique_ptr<server::Store> store_;

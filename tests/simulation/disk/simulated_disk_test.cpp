@@ -72,7 +72,7 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
         solve_all(disk);
       } catch (const server::StorageGone&) {
         ended = true;
-        if (seed % 3 == 0) {  // after a failed sync an orderly end does not merge the log
+        if (seed % 3 == 0) {  // after a failed sync, close() does not merge the log
           disk.close();
           EXPECT_TRUE(disk.files().exists(disk.files().path() + "-wal"));
         }
@@ -87,7 +87,7 @@ TEST(FailingSync, EndsTheServerAndLosesNoStudyAfterAPowerFailure) {
       }
       ++failures;
       EXPECT_TRUE(ended) << "sync " << sync << ", seed " << seed;
-      // In half of the cases a restarted server solves the rest before the power fails.
+      // In half of the cases a restarted server solves the remaining points before the power fails.
       const bool starts_again = seed % 2 == 0;
       if (starts_again) {
         disk.crash(false);

@@ -306,7 +306,7 @@ constexpr std::size_t kSector = 512;
 /// Size of the pages that an operating system caches and writes [bytes].
 constexpr std::size_t kPage = 4096;
 
-/// Returns a random first part of `bytes`, which a failing write still writes.
+/// Returns a random prefix of `bytes`: the part that a failing write writes.
 std::string_view some_of(World& world, std::string_view bytes) {
   return bytes.substr(
       0, static_cast<std::size_t>(world.between(0, static_cast<std::int64_t>(bytes.size()))));
@@ -316,8 +316,8 @@ std::string_view some_of(World& world, std::string_view bytes) {
 
 // ---- One file -----------------------------------------------------------------------------------
 
-/// Draws at random which writes reached the disk before a power failure: either the first ones and
-/// a part of the next, or any subset for each sector.
+/// Draws which writes survive a power failure: either the first writes and a part of the next one,
+/// or, separately for each sector, any number of its first writes.
 class SimulatedFile::Losses {
  public:
   Losses(World& world, const std::vector<Step>& steps)
@@ -336,7 +336,8 @@ class SimulatedFile::Losses {
   }
 
   bool keeps_size(std::int64_t step) const { return step < kept_; }
-  /// Returns the file size after a partly done step, which would have ended at `end`.
+  /// Returns the end of the surviving part of a torn write that would have ended at `end`; 0 for
+  /// other steps.
   std::size_t torn_end(std::int64_t step, std::size_t end) const {
     return step == kept_ && !reordered_ ? std::min(end, torn_before_ * kSector) : 0;
   }

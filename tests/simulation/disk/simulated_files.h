@@ -26,13 +26,13 @@ class SimulatedFile {
   void write(std::size_t offset, std::string_view bytes);
   void truncate(std::size_t size);
   void sync();
-  /// Simulates a failed sync after which the system marks the pages as written, as Linux does:
-  /// reads return their contents, but only another write brings them to the disk.
+  /// Simulates a failed sync after which the system marks the pages as written, as Linux does.
+  /// Reads return the new contents, but the disk gets them only if the pages are written again.
   void forget_unsynced();
 
-  /// Simulates a power failure. Synced contents survive. Of later writes any part survives: sectors
-  /// are atomic, reach the disk in any order, and each may keep any of its earlier states. The same
-  /// is true of the file size. Bytes inside the file that were never written are zero.
+  /// Simulates a power failure. Synced contents survive. Of later writes a random part survives:
+  /// each sector and the file size may have the state before or after any of these writes. Bytes
+  /// that were never written are zero.
   void lose_power(World& world);
 
  private:
@@ -74,7 +74,7 @@ class SimulatedFiles {
 
   /// Starts a process that uses the files.
   void start();
-  /// Ends the process: its handles do nothing more; its writes survive.
+  /// Ends the process. Its writes survive. Its open handles have no effect any more.
   void kill();
   bool is_used() const { return used_; }
   /// Simulates a power failure: only the files and file names on the disk survive.

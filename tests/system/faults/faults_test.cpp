@@ -51,7 +51,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
   const Outcome refused =
       run_oblique(folder, {"submit", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1",
                            "--name", "another", "--server", server.client_url()});
-  // The submission succeeds if its rows still fit below the limit.
+  // The submission succeeds if its rows still fit below the limit of the file size.
   EXPECT_TRUE(refused.exit_code == 0 || refused.err.find("was not stored") != std::string::npos)
       << refused.err;
   EXPECT_TRUE(is_running(server.process().pid()));
@@ -68,7 +68,7 @@ TEST(DiskFullTest, AStudyWaitsForDiskSpaceReportsThisAndLosesNothing) {
 TEST(FailedSyncTest, AServerExitsWithOneAndTheNextServerRecovers) {
   const TemporaryFolder folder;
   const std::string file = folder.file("failing.db");
-  // LD_PRELOAD separates paths at spaces and colons, so a link whose path has none is used.
+  // LD_PRELOAD separates paths at spaces and colons. The path of this link contains neither.
   const std::string library = folder.file("failing_sync.so");
   std::filesystem::create_symlink(OBLIQUE_FAILING_SYNC, library);
   const std::string mark = folder.file("fails");
@@ -173,7 +173,7 @@ TEST(WorkerOfARunTest, EndsIfTheRunWasKilledBeforeTheWorkerStarted) {
 TEST_F(RunTest, ARunContinuesWhenOneOfItsWorkersIsKilled) {
   Process run(folder_, client_program(), arguments());
   const auto children = started_by(run);
-  // `oblique run` starts its workers after the server
+  // `oblique run` starts the server first, so the highest process id belongs to a worker.
   const pid_t worker = *std::max_element(children.begin(), children.end());
   kill(worker, SIGKILL);
   EXPECT_EQ(run.wait(), 0) << run.err();

@@ -16,7 +16,7 @@ struct Entry {
   const char* program;
   const char* point;
   int signal;
-  int highest;  ///< maximum of the random occurrence, or time [ms]
+  int highest;  ///< largest random occurrence; for `time`, largest time [ms]
 };
 
 constexpr bool kApart = false;
@@ -27,14 +27,14 @@ constexpr const char* kWorker = "oblique-worker";
 constexpr const char* kNoProcess = "";
 constexpr int kNoSignal = 0;
 
-// Entries with a storm have one of these in place of a point.
+// Names of storms. An entry with a storm has such a name in place of a point.
 constexpr const char* kKilledWorkers = "storm:killed workers";
 constexpr const char* kCutConnections = "storm:cut connections";
 constexpr const char* kVanishingPeers = "storm:vanishing peers";
 
-// The test that always runs uses the first 23 entries. They contain every class of point, every
-// program both started apart and by `oblique run`, and both signals. Without a signal a run reaches
-// every point as often as an entry requires.
+// The test that always runs uses the first 23 entries. They contain every class of point, both
+// signals, and every program, started separately and by `oblique run`. Without a signal a run
+// reaches each point as often as its entry requires.
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},
@@ -96,7 +96,7 @@ constexpr std::array kMatrix{
     Entry{kApart, kClient, "before-send:status", SIGKILL, 12},
     Entry{kApart, kClient, "after-send:status", SIGSTOP, 12},
     Entry{kApart, kClient, "time", SIGSTOP, 800},
-    // Signals to `oblique run` and its children. The first arrives during their start.
+    // Signals to `oblique run` and its children. The first signal arrives while they start.
     Entry{kRun, kClient, "time", SIGKILL, 40},
     Entry{kRun, kClient, "time", SIGSTOP, 800},
     Entry{kRun, kClient, "before-send:submit", SIGKILL, 1},
@@ -154,7 +154,8 @@ KillCase draw_case(std::uint64_t seed) {
   drawn.storm = storm_of(drawn.point);
   drawn.signal = entry.signal;
   drawn.occurrence = up_to(entry.highest);
-  // Without a pause the process has not sent the message yet; after 20 ms it has.
+  // Without a pause the signal precedes the message. A pause of 20 ms lets the message be sent
+  // first.
   drawn.pause = milliseconds(random() % 2 == 0 ? 0 : 20);
   drawn.server_stops_first = random() % 2 == 0;
   if (drawn.signal == SIGSTOP) {

@@ -26,9 +26,9 @@ constexpr std::chrono::milliseconds kPollInterval{5};
 constexpr int kMaxAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code of a complete study with failed points
 
-// The study has several models, so that batches end before the study does. The first block takes
-// long enough for heartbeats and about twenty commits. A filter leaves out half of the second
-// block. Both points of the last block fail.
+// The study has several models, so that batches end during the study. The first block takes long
+// enough for heartbeats and about twenty commits. A filter leaves out half of the second block.
+// Both points of the last block fail.
 constexpr const char* kStudy = R"(name = "matrix"
 [model]
 preset = "paper"
@@ -60,8 +60,8 @@ bool reports_end_of_study(const Process& process) {
          process.err().find("points failed") != std::string::npos;
 }
 
-/// Injects the signal of a cycle. A process sends the signal to itself by the library kill_points,
-/// which this class controls by environment variables. This class also continues or kills a halted
+/// Injects the signal of a cycle. The library kill_points lets a process send the signal to itself.
+/// This class controls the library by environment variables. It also continues or kills a halted
 /// process.
 class FaultInjection {
  public:
@@ -70,7 +70,7 @@ class FaultInjection {
         folder_(folder.path().string()),
         mark_(folder.file("mark")),
         library_(folder.file("kill_points.so")) {
-    // LD_PRELOAD separates paths at spaces and colons, so a link whose path has none is used.
+    // LD_PRELOAD separates paths at spaces and colons. The path of this link contains neither.
     std::filesystem::create_symlink(OBLIQUE_KILL_POINTS, library_);
     if (case_.signal == SIGSTOP) {
       halt_ = std::jthread([this](const std::stop_token& stop) { end_halt(stop); });
@@ -79,7 +79,8 @@ class FaultInjection {
   FaultInjection(const FaultInjection&) = delete;
   FaultInjection& operator=(const FaultInjection&) = delete;
 
-  /// Returns the environment of `program`, with the order for a signal if the case names `program`.
+  /// Returns the environment of `program`. If the case names `program`, the environment contains
+  /// the order for the signal.
   Environment environment(const std::string& program) const {
     Environment all = plain_environment();
     if (program == case_.program) {
@@ -220,7 +221,7 @@ class ApartCycle {
 
   /// Runs the client. Returns false if it was killed and must be started again.
   bool submit_and_watch(bool first) {
-    // The long timeout lets the client send requests again that a killed server had received.
+    // With the long timeout the client can repeat requests that a killed server had received.
     Process client(
         folder_, client_program(),
         {"submit", study_.file(), "--server", server_->client_url(), "--watch", "--timeout", "600"},
@@ -250,7 +251,7 @@ class ApartCycle {
   }
 
   void stop(const std::string& program, Process& process) {
-    // A program may not handle signals before its first log line.
+    // A program does not necessarily handle signals before its first log line.
     wait_until(program + " has begun",
                [&] { return process.exit_code() || !process.err().empty(); });
     if (!process.exit_code()) {

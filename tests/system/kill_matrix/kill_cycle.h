@@ -29,8 +29,8 @@ struct KillCase {
   bool is_killed() const;
 };
 
-/// Returns the case of a seed: the matrix entry `seed` modulo the number of entries. The seed also
-/// determines all random choices.
+/// Returns the case of a seed. Its entry in the matrix is `seed` modulo the number of entries. The
+/// seed also determines all random choices.
 KillCase draw_case(std::uint64_t seed);
 
 /// Returns the number of entries of the matrix.

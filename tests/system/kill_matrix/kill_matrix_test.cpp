@@ -62,7 +62,7 @@ class ComparisonTest : public ::testing::Test {
 TEST_F(ComparisonTest, FindsExactlyTheDifferencesThatAreNotAllowed) {
   EXPECT_EQ(difference_after("SELECT 1"), "");
   EXPECT_EQ(difference_after("UPDATE results SET attempt = 7, wall_s = 1, solved_at = 'then'"), "");
-  // Selects the 300th stored point, because a filter leaves out some point numbers.
+  // Selects a point by its position, because a filter leaves out some point numbers.
   const std::string one = " WHERE point = (SELECT point FROM results LIMIT 1 OFFSET 300)";
   for (const std::string& change : std::vector<std::string>{
            "UPDATE results SET fn_peak_N = fn_peak_N + 1" + one,

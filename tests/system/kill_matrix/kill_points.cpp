@@ -1,6 +1,6 @@
 // A library that a test loads into a program with LD_PRELOAD, so that the program needs no hooks.
-// The library intercepts the calls with which the program commits, sends and receives, and sends it
-// a signal at one of them.
+// The library intercepts the calls with which the program commits, sends and receives. At one of
+// these calls it sends a signal to the program.
 //
 // OBLIQUE_KILL_AT = "PROGRAM POINT OCCURRENCE SIGNAL PAUSE_MS MARK" defines the signal:
 //   PROGRAM     name of the program; other programs inherit the variable and ignore it
@@ -57,7 +57,8 @@ std::optional<Order> order_for(const std::string& program) {
 
 // ---- Kinds of messages --------------------------------------------------------------------------
 
-/// Names of the kinds of a message, in the order of their Protobuf fields from `first` on.
+/// Names of kinds of messages, in the order of their Protobuf field numbers, which begin at
+/// `first`.
 struct Kinds {
   std::uint64_t first;
   std::vector<std::string> names;
@@ -158,7 +159,7 @@ class KillPoints {
     }
   }
 
-  /// Starts the timer thread, which blocks all signals, so that the program's own threads get them.
+  /// Starts the timer thread. It blocks all signals, so that the program's own threads get them.
   void start_clock() const {
     sigset_t all;
     sigset_t before;
@@ -225,7 +226,7 @@ struct Connection {
   Stream sent;
 };
 
-/// Connections by descriptor, without a lock, because one thread of the server uses all sockets.
+/// Connections by descriptor. They need no lock, because one thread of the server uses all sockets.
 std::map<int, Connection>& connections() {
   static auto* const only = new std::map<int, Connection>;
   return *only;

@@ -24,7 +24,7 @@ void write_to(const std::string& file, const std::string& text) {
   std::ofstream(file) << text;
 }
 
-/// Enters new namespaces. Root is only needed if the system allows no user namespaces.
+/// Enters new namespaces. Requires root only if the system allows no user namespaces.
 void enter_namespaces() {
   const uid_t user = geteuid();
   const gid_t group = getegid();

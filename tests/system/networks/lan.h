@@ -34,7 +34,8 @@ class Host {
   void plug_cable() const;
   /// Drops `percent` percent of the arriving packets at random.
   void lose_percent(int percent) const;
-  /// Drops all packets from and to this machine. Its peers get no notice that it is unreachable.
+  /// Drops all packets from and to this machine. Peers get no notice that the machine is
+  /// unreachable.
   void lose_everything() const;
   void lose_nothing() const;
   /// Changes the machine's addresses to 10.77.0.`last` and fd77::`last`.

@@ -100,8 +100,8 @@ class StudyOnLan : public ::testing::Test {
     return std::make_unique<Process>(folder_, client_program(), arguments);
   }
 
-  /// Starts all programs that do not run yet, and calls `fault` when the first results are stored;
-  /// `fault` causes and repairs a fault. Then the study must complete (small_study.h), and all
+  /// Starts all programs that do not run yet. When the first results are stored, calls `fault`,
+  /// which causes and repairs a fault. Then the study must complete (small_study.h), and all
   /// workers must still run. Prints the time until new results are stored.
   void expect_completion_after(const std::function<void()>& fault, std::size_t workers = 2) {
     if (server_ == nullptr) {
@@ -134,7 +134,7 @@ class StudyOnLan : public ::testing::Test {
   std::array<Host*, 2> worker_hosts_{};
   Host* client_host_ = nullptr;
 
-  /// The host name of the server in addresses; initially its IPv4 address.
+  /// Host part of the server's address; initially its IPv4 address.
   std::string server_name_;
   std::string keys_;  ///< folder with the keys of all programs; empty: no keys
 
@@ -337,7 +337,7 @@ class PlainText : public StudyOnLan {
     return capture.bytes();
   }
 
-  /// Texts that plain traffic reveals: names of study and worker, a column, a word of a statement,
+  /// Texts that unencrypted traffic contains: names of study and worker, a column, a word of SQL,
   /// states of a contact and a value.
   const std::vector<std::string> revealing_texts_{"conspicuous", "worker1", "fn_peak_N",
                                                   "SELECT",      "SC SR",   "0.95"};

@@ -36,9 +36,9 @@ inline void print_measured(const std::string& what, std::chrono::steady_clock::t
   std::printf("[ MEASURED ] %s: %s: %.1f s\n", test->name(), what.c_str(), time.count());
 }
 
-/// Expects that `client`, which watches the study, reports its end; that each point has one row and
-/// none failed; and that no worker in `workers` (output of `oblique workers --format json`) is set
-/// aside.
+/// Expects that `client` reports the end of the study, that each point has one row and none failed,
+/// and that no worker is set aside. `workers` returns the output of `oblique workers --format
+/// json`.
 inline void expect_completed(Process& client, const Database& database,
                              const std::function<std::string()>& workers) {
   wait_for_rows(database, kManyPoints);

@@ -114,8 +114,8 @@ TEST_F(LeavingProgramTest, AWorkerThatNeverReachedItsServerExitsWithOneAndNamesT
 
 TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
-  EXPECT_EQ(refused.wait(),
-            1);  // 5 s end after the first attempt, which takes 3 s, and before the second ends
+  // The first attempt takes 3 s. The limit of 5 s ends during the second attempt.
+  EXPECT_EQ(refused.wait(), 1);
   const std::string output = refused.err();
   EXPECT_NE(output.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << output;
   EXPECT_EQ(output.find("no server answers"), output.rfind("no server answers")) << output;

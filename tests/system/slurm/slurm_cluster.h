@@ -12,8 +12,8 @@
 namespace oblique::test {
 
 /// A Slurm cluster on loopback: munged, slurmctld, and one slurmd for each of two nodes, n1 and n2.
-/// The nodes are this machine under two names, with one core each. All files of the cluster are in
-/// the folder. The partitions `work` (the default) and `grace` (30 s for preempted jobs) requeue
+/// The nodes are this machine under two names, with one core each. One folder contains all files of
+/// the cluster. The partitions `work` (the default) and `grace` (30 s for preempted jobs) requeue
 /// jobs; the partition `urgent` preempts their jobs.
 class SlurmCluster {
  public:

@@ -166,8 +166,8 @@ TEST_F(SlurmWorkersTest, OneJobRunsAWorkerOnEachOfItsNodesUntilThereIsNoMoreWork
 }
 
 TEST_F(SlurmWorkersTest, WorkersLeaveInOrderBeforeTheirTimeLimit) {
-  // One minute is the shortest time limit in Slurm. The workers leave 53 s before it. Points are
-  // still open then, unless this machine is so slow that the workers start later.
+  // One minute is the shortest time limit in Slurm. The workers leave 53 s before the limit. Points
+  // are still open then, unless the machine is so slow that the workers start later.
   const auto job = submit_workers({"--time=1"}, {{"OBLIQUE_WORKER_LEAVE_BEFORE", "53"}});
   submit_study();
   cluster_->wait_for_state(job, "COMPLETED");  // not TIMEOUT

@@ -10,8 +10,8 @@
 
 namespace oblique::test {
 
-/// A storm: faults of one kind that are repeated while undisturbed workers solve a study. No point
-/// may fail because of it.
+/// Kind of a storm. A storm repeats one kind of fault while undisturbed workers solve a study. No
+/// point may fail because of a storm.
 enum class StormKind {
   kKilledWorkers,   ///< a worker is killed shortly after each start
   kCutConnections,  ///< the connection of a worker is cut repeatedly
