@@ -169,8 +169,8 @@ struct Underway : Study {
   double count() const { return database.rows(); }
 };
 
-/// Measures the time from killing a worker until another worker has solved all points of the killed
-/// one. These points have attempt 2.
+/// Measures the time from killing a worker until another worker has solved all points that the
+/// killed worker held. These points have attempt 2.
 void bench_worker_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker survivor(study.folder, study.server.worker_url());

@@ -176,7 +176,8 @@ ClampedBeam beam_of(int elements) {
       {kLength_m, kSlenderness * kEI_N_m2 / (kLength_m * kLength_m), kEI_N_m2, elements});
 }
 
-/// Returns the distance between the computed tip and that of the elastica, divided by the length.
+/// Returns the distance between the computed tip and the tip of the elastica, divided by the
+/// length.
 double elastica_error(double alpha, int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({alpha * kEI_N_m2 / (kLength_m * kLength_m), 0.0}, 20);

@@ -138,7 +138,7 @@ TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
 /// phi.
 double half_period_s(const Motion& motion, const ChainState& start, double dt_s) {
   const auto product = [&](const ChainState& state) {
-    // Computes a^T M b, up to a factor, from kinetic energies T: T(a + b) - T(a - b). a is the
+    // Computes a^T M b up to a factor, as T(a + b) - T(a - b) with the kinetic energy T. a is the
     // transverse displacement, b the mode.
     ChainState sum = start;
     ChainState difference = start;

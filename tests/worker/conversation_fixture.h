@@ -181,7 +181,7 @@ class ConversationTest : public ::testing::Test {
     return batches;
   }
 
-  /// Returns nothing until the conversation has ended.
+  /// Returns nothing while the conversation has not ended.
   std::optional<int> exit_code() const {
     return finish() ? std::optional(finish()->exit_code) : std::nullopt;
   }

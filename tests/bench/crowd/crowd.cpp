@@ -95,7 +95,7 @@ class Crowd::Parts {
     worker::Conversation conversation;
     std::optional<zmq::socket_t> socket;
     std::deque<Job> jobs;
-    double solving_since_s = 0.0;  // when the unreported points of the first job began
+    double solving_since_s = 0.0;  // start of solving the unreported points of the first job
   };
 
   void run() {
@@ -135,9 +135,8 @@ class Crowd::Parts {
     }
   }
 
-  /// Receives all messages and reports due points, until there are no more of either. One pass is
-  /// not enough, because sending may reset the readiness of the descriptor (ZMQ_FD is
-  /// edge-triggered).
+  /// Receives messages and reports due points, repeatedly, until neither is left. The repetition is
+  /// needed because sending may clear the readiness of the descriptor (ZMQ_FD is edge-triggered).
   void work_on(std::size_t number) {
     receive_all(number);
     while (report_due(number) && receive_all(number)) {
@@ -160,7 +159,8 @@ class Crowd::Parts {
     return any;
   }
 
-  /// Reports the points of the first batch that are solved by now. Returns false if there are none.
+  /// Reports solved points of the first batch in at most one message. Returns false if no report is
+  /// due.
   bool report_due(std::size_t number) {
     Member& member = *members_[number];
     if (member.jobs.empty() || !member.conversation.may_solve()) {
@@ -168,7 +168,7 @@ class Crowd::Parts {
     }
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
-    // Sends at most one message, so that other workers get their turn.
+    // One message at a time, so that other workers get their turn.
     std::uint64_t solved = std::min<std::uint64_t>(left, kResultsATurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {

@@ -23,13 +23,13 @@ struct CrowdCounts {
   std::uint64_t batches = 0;
   std::uint64_t results = 0;   ///< produced
   std::uint64_t messages = 0;  ///< sent
-  std::uint64_t connects = 0;  ///< more than the number of workers if some had to reconnect
+  std::uint64_t connects = 0;  ///< made; more than there are workers if some reconnected
   std::uint64_t welcomed = 0;
   /// Longest delay of the crowd's thread. If it exceeds 2 s, workers consider the server silent.
   double longest_gap_s = 0.0;
 };
 
-/// Size of the result that answers every point.
+/// Returns the size of the result with which all points are answered.
 std::size_t bytes_of_result();
 
 /// Many simulated workers on one thread. Each has its own socket and follows the worker protocol,

@@ -37,10 +37,11 @@ using Kind = QueryReport::Kind;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-/// SQLite compares bytes for hours in this query, without checking for an interrupt.
+/// In this query SQLite compares bytes for hours without checking for an interrupt.
 constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
-/// The result has some megabytes, more than a reader sends before the client takes chunks.
+/// The result of this query has several megabytes. A reader sends less than that before the client
+/// takes chunks.
 constexpr const char* kLong =
     "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 60000) "
     "SELECT i, hex(zeroblob(50)) FROM n";
@@ -73,7 +74,7 @@ class QueryPoolTest : public testing::Test {
     return last_ticket_;
   }
 
-  /// The reports on a query so far, added up.
+  /// Summary of the reports on one query.
   struct Answer {
     bool runs = false;
     bool ended = false;

@@ -132,14 +132,15 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
   bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
-  // The limit is ten times the time of eight points side by side on the quick worker.
+  // The quick worker needs 10 s for a point, which makes 80 s for eight points. The limit is ten
+  // times that time.
   bench.pass(780'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-/// Like StallTest, but worker 2 waits for a batch.
+/// Provides the study of StallTest and a worker 2 that waits for a batch.
 class StragglerTest : public StallTest {
  protected:
   StragglerTest() { EXPECT_TRUE(bench_.join(2, 1).empty()); }
@@ -151,7 +152,7 @@ class StragglerTest : public StallTest {
     return batches.at(0);
   }
 
-  /// Receives results of some points of a batch and reports them as durable.
+  /// Passes results of some points of a batch to the scheduler and reports them as stored.
   std::vector<Effect> answer(const SendBatch& batch, const std::vector<std::uint64_t>& points,
                              bool done) {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench_.sequence, done, 0.0, {}};
@@ -176,7 +177,7 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
   SchedulerBench bench(settings());
   bench.feed(StudyAdded{1, table_of(4), {}});
   bench.join(1, 1);
-  // After three lost new workers, later new workers must solve a probe first.
+  // After three new workers are lost, each later new worker must solve a probe first.
   for (const WorkerId id : {11U, 12U, 13U}) {
     bench.feed(StudyAdded{id, table_of(1), {}});
     bench.join_as("vanishes " + std::to_string(id), id, 1);

@@ -94,7 +94,7 @@ class ServiceTest : public testing::Test {
  protected:
   ServiceTest() { start({}); }
 
-  /// Replaces the service by one on a database with these studies.
+  /// Replaces the service by one with these settings and stored studies.
   void start(ServiceSettings settings, std::vector<StoredStudy> studies = {}) {
     settings.solver_version = "1.0";
     settings.database_id = "db";
@@ -144,7 +144,8 @@ class ServiceTest : public testing::Test {
     request(change_request(name, change));
     write_all();
   }
-  /// Answers the last batch and completes the write. Points from `first_failed` on have failed.
+  /// Answers the last batch and completes the write. The points from `first_failed` on are answered
+  /// as failed.
   void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
     const auto batch = last_message().batch();
     WorkerMessage message;
@@ -225,7 +226,8 @@ class ServiceTest : public testing::Test {
     request(message);
     return last_reply().status().studies(0);
   }
-  /// Completes all waiting writes. Writes that can fail end with `error` unless it is empty.
+  /// Completes all waiting writes. If `error` is not empty, writes that can fail end with that
+  /// error.
   void write_all(const std::string& error = {}) {
     for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
       const bool refused = !error.empty() && job.answer_failure;

@@ -354,7 +354,7 @@ TEST_F(ServiceTraceTest,
   worker_sends(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
-  // The reply for a trace that is too long contains the value of `every` that would fit.
+  // If a trace is too long, the reply contains a value of `every` with which it would fit.
   ask(9, 3);
   trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
@@ -493,7 +493,7 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
                 trace.clear_states();
               }),
               HasSubstr("no rows"));
-  worker_sends(trace_of({}, ""));  // a trace without an order is ignored
+  worker_sends(trace_of({}, ""));  // the service ignores a trace that it did not order
   ask(99, 60);
   worker_sends(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());

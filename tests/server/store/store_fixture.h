@@ -26,14 +26,14 @@ inline Table table(const protocol::Recipe& recipe) {
   return std::make_shared<const protocol::PointTable>(recipe);
 }
 
-/// Returns ten points with mu from 0 to 1, of which a filter leaves out some.
+/// Returns ten points with mu from 0 to 1 and the filter `where`.
 inline Table filtered_table(const std::string& where) {
   protocol::Recipe recipe = table_of(10)->recipe();
   recipe.mutable_blocks(0)->set_where(where);
   return table(recipe);
 }
 
-/// Returns ten points followed by ten more.
+/// Returns the ten points of `table_of(10)` twice.
 inline Table grown_table() {
   protocol::Recipe recipe = table_of(10)->recipe();
   *recipe.add_blocks() = recipe.blocks(0);

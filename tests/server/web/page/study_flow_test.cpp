@@ -23,7 +23,7 @@ using protocol::ClientRequest;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-/// Runs some queries and answers with the points that their rows contain.
+/// Runs `queries` queries. The answer lists the points in their rows.
 class Points : public StudyAnswer {
  public:
   explicit Points(int queries = 1, const std::string& condition = {})

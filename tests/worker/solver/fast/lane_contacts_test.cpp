@@ -57,7 +57,8 @@ std::map<std::uint64_t, Outcome> solved(
   return outcomes;
 }
 
-/// Returns models whose chains differ but have one shape. The last and the first differ in k only.
+/// Returns models whose chains differ but have one shape. The last model differs from the first
+/// only in k.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());

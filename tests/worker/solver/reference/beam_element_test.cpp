@@ -146,7 +146,8 @@ TEST(BeamElement, FiveGaussPointsGiveTheExactEnergy) {
       simpson += weight * 0.5 * (kEA_N * strain * strain + kEI_N_m2 * curvature_squared);
     }
     simpson *= kLength_m / kIntervals / 3.0;
-    // Simpson's rule errs by the fourth power of the interval, 1e-14, times a fourth derivative.
+    // The error of Simpson's rule is the fourth power of the interval, 1e-14, times a fourth
+    // derivative.
     EXPECT_NEAR(energy(q), simpson, 1e-10 * energy(q));
   }
 }

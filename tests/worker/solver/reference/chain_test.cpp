@@ -83,13 +83,14 @@ TEST(Chain, RigidRotationAboutThePinGivesNeitherForceNorEnergy) {
   for (const double angle_rad : {-1.5, -0.4, 0.9, 3.0}) {
     const Coordinates q = turned(chain, angle_rad);
     EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-    // A strain of 1 would give a force of 3.7e7 N.
+    // For comparison: a strain of 1 gives a force of 3.7e7 N.
     EXPECT_LT(probe.elastic_force(q).cwiseAbs().maxCoeff(), 1e-5);
   }
 }
 
 TEST(Chain, JointsRotateFreely) {
-  // Folding the outer link back onto the inner link, which is as long, stores no energy.
+  // The outer link is folded back onto the inner link, which has the same length. This stores no
+  // energy.
   ModelParameters model = preset("paper");
   model.lengths_m = {0.4, 0.4};
   model.elements_per_link = 1;

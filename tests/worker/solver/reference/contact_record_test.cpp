@@ -255,8 +255,8 @@ TEST(ContactMargin, AtTouchIsTheDistanceBetweenStickAndSlip) {
 }
 
 TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsOne) {
-  // The contact turns once and ends at the speed of touch. Stick does not count, because P never
-  // sticks without friction.
+  // The contact has one compression and ends at the speed of touch. Stick does not count, because P
+  // never sticks without friction.
   const Contact contact = followed([](double t_s) { return half_period(t_s, 1e-9); }, 0.0, 1e-3);
   ASSERT_TRUE(contact.finished());
   EXPECT_EQ(contact.margin().nearest(100.0).distance, 1.0);
@@ -281,7 +281,8 @@ TEST(ReactionPeaks, MeansOverIntervalsGiveThePeakOfTheFunction) {
     add(peaks, t_s + kSpan_s, kSpan_s, 7.0 * mean_of_sine(t_s, t_s + kSpan_s));
   }
   const ReactionPeak peak = peaks.peaks().at(0);
-  // Means are lower than the peak by (0.2)^2/24 = 1.7e-3. Corrected means have an error of order 4.
+  // The mean over an interval is lower than the peak by the fraction 0.2^2/24 = 1.7e-3. After its
+  // correction, an error of order 4 remains.
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 1e-4);
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 1e-3);
 }
@@ -322,8 +323,8 @@ TEST(ReactionPeaks, TheLargestOfSeveralPeaksCounts) {
 }
 
 TEST(ReactionPeaks, APeakBetweenInstantsCountsEvenIfAnInstantOfAnotherPeakIsHigher) {
-  // The top of 1 - (t - 1)^2 is at an instant. The top of 1.005 - (t - 3.1)^2 is 0.1 from any
-  // instant.
+  // The maximum of 1 - (t - 1)^2 is at an added instant. The maximum of 1.005 - (t - 3.1)^2 is in
+  // the middle between two instants.
   ReactionPeaks peaks(1);
   for (int i = 0; i <= 20; ++i) {
     const double t_s = 0.2 * i;

@@ -61,9 +61,9 @@ TEST(Contact, AnAsymmetricCrossingInsideAStepIsLocated) {
 }
 
 /// Returns a path in which both forces rise and fall together for half a period. In the middle, the
-/// turn coincides with the extremum of F_t. At the end, separation coincides with slip in both
-/// directions. The tangential motion leads by `lead_s`. `skew` changes the errors of the
-/// polynomials through a step.
+/// end of compression coincides with the extremum of F_t. At the end, separation coincides with
+/// slip in both directions. The tangential motion leads by `lead_s`. `skew` changes the errors of
+/// the polynomials that approximate a step.
 TipPath in_step(double lead_s, double skew = 0.0) {
   return [lead_s, skew](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
@@ -115,7 +115,8 @@ TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
 }
 
 TEST(Contact, ATurnAndAnExtremumAtTheSameInstantHappenOnceEach) {
-  // This holds for any order of the polynomials' roots, and for any distance due to rounding.
+  // The polynomials may have their roots in any order, and rounding may separate them by any
+  // distance.
   for (const double skew : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3}) {
     for (const double step_s : {0.6e-4, 0.7e-4, 0.9e-4, 1.1e-4}) {
       SCOPED_TRACE(skew);
