@@ -32,9 +32,9 @@ def main(programs, names):
             subprocess.run([oblique, "run", "--limit", "0", *CASES[name]],
                            check=True, capture_output=True, cwd=folder)
             measured = time.perf_counter() - begun
-        said = json.loads(check.stdout)
-        print(f"{name}: {said['points']} points, {said['falls']} falls: predicted {said['time_s']:.1f} s, "
-              f"measured {measured:.1f} s, ratio {said['time_s'] / measured:.2f}", flush=True)
+        predicted = json.loads(check.stdout)
+        print(f"{name}: {predicted['points']} points, {predicted['falls']} falls: predicted {predicted['time_s']:.1f} s, "
+              f"measured {measured:.1f} s, ratio {predicted['time_s'] / measured:.2f}", flush=True)
 
 
 if __name__ == "__main__":

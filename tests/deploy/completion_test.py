@@ -28,7 +28,7 @@ class Completion(unittest.TestCase):
 
     def setUp(self):
         if shutil.which(self.shell) is None:
-            self.skipTest(f"there is no {self.shell}")
+            self.skipTest(f"{self.shell} is not installed")
 
     @classmethod
     def setUpClass(cls):

@@ -121,9 +121,9 @@ class Pages(unittest.TestCase):
 
     def test_pages_have_the_flags_of_help(self):
         for name, page in self.pages.items():
-            told = re.findall(r"^\.[TH]P\n(?:\\fB\\-\w\\fR, )?\\fB(\\-\\-[\w\\-]+)\\fR", page, re.M)
+            listed = re.findall(r"^\.[TH]P\n(?:\\fB\\-\w\\fR, )?\\fB(\\-\\-[\w\\-]+)\\fR", page, re.M)
             of_help = set().union(*(flags_in_help(words) for words in VERBS if "-".join(words[:2]) == name))
-            self.assertEqual({flag.replace("\\-", "-") for flag in told}, of_help, name)
+            self.assertEqual({flag.replace("\\-", "-") for flag in listed}, of_help, name)
 
     def test_pages_have_the_examples_of_help(self):
         for words in VERBS:

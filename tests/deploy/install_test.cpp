@@ -109,7 +109,7 @@ TEST(InstallTest, EachPartHasOnlyItsProgramAndFiles) {
 
 TEST(InstallTest, EachPartHasTheManualPagesOfItsProgramWithTheDateOfTheTree) {
   if (!std::filesystem::exists(OBLIQUE_BUILD_FOLDER "/proto/program/manual/pages/made")) {
-    GTEST_SKIP() << "the pages are not built: there was no help2man";
+    GTEST_SKIP() << "the manual pages are not built because help2man is missing";
   }
   const TemporaryFolder folder;
   for (const std::string part : {"server", "worker", "client"}) {
@@ -193,7 +193,7 @@ TEST(InstallTest, SettingsInInstalledConfigurationAreValid) {
   }
 }
 
-TEST(InstallTest, EditedConfigurationStays) {
+TEST(InstallTest, AnInstallKeepsEditedConfiguration) {
   const TemporaryFolder folder;
   const std::string prefix = folder.file("opt");
   ASSERT_EQ(install(folder, prefix, "server").exit_code, 0);
@@ -224,7 +224,7 @@ TEST(PackagesTest, TheArchiveRunsWhereItIsUnpackedWithLibrariesOfItsOwn) {
   const TemporaryFolder folder;
   for (const std::string tool : {"patchelf", "dpkg-query"}) {
     if (!is_there(folder, tool)) {
-      GTEST_SKIP() << "there is no " << tool << " here";
+      GTEST_SKIP() << tool << " is not installed";
     }
   }
   const auto archives = packages(folder, "TGZ");
@@ -267,7 +267,7 @@ std::string expected_of_consumer() {
                      json["mode"].get<std::string>(), json["solver"]["version"].get<std::string>());
 }
 
-TEST(InstalledLibraryTest, AUsersProgramFindsItAndGetsTheBitsOfSolve) {
+TEST(InstalledLibraryTest, AUserProgramLinksTheLibraryAndGetsTheSameBitsAsSolve) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
   const std::string build = folder.file("build");
@@ -284,20 +284,20 @@ TEST(InstalledLibraryTest, AUsersProgramFindsItAndGetsTheBitsOfSolve) {
   EXPECT_EQ(run.out, expected_of_consumer() + "mu = -0.4 is not allowed: mu must be >= 0\n");
 }
 
-TEST(InstalledLibraryTest, PkgConfigFindsItWithoutDependencies) {
+TEST(InstalledLibraryTest, PkgConfigFindsTheLibraryWithoutDependencies) {
   const TemporaryFolder folder;
   const std::string prefix = installed_library(folder);
-  const auto asked = run_tool(
+  const auto flags = run_tool(
       folder, "sh",
       {"-c", "PKG_CONFIG_PATH=$(dirname \"$(find '" + prefix +
                  "' -name oblique.pc)\") && export PKG_CONFIG_PATH && "
                  "pkg-config --cflags --libs oblique && pkg-config --print-requires oblique"});
-  EXPECT_EQ(asked.exit_code, 0) << asked.err;
-  EXPECT_THAT(asked.out, AllOf(HasSubstr("used\\ here"), HasSubstr("-loblique"),
+  EXPECT_EQ(flags.exit_code, 0) << flags.err;
+  EXPECT_THAT(flags.out, AllOf(HasSubstr("used\\ here"), HasSubstr("-loblique"),
                                Not(HasSubstr("made")), ::testing::EndsWith("-loblique \n")));
 }
 
-TEST(InstalledLibraryTest, ItsHeadersIncludeNothingButTheStandardLibraryAndEachOther) {
+TEST(InstalledLibraryTest, HeadersIncludeOnlyTheStandardLibraryAndEachOther) {
   const TemporaryFolder folder;
   const auto included = run_tool(folder, "sh",
                                  {"-c", "grep -rho '^#include .*' '" + installed_library(folder) +
@@ -309,7 +309,7 @@ TEST(InstalledLibraryTest, ItsHeadersIncludeNothingButTheStandardLibraryAndEachO
             "#include <oblique/solver/solve_many.h>\n#include <oblique/solver/trace.h>\n");
 }
 
-TEST(InstalledLibraryTest, ItExportsOnlyTheNamesOfItsHeaders) {
+TEST(InstalledLibraryTest, TheLibraryExportsOnlyTheNamesInItsHeaders) {
   const TemporaryFolder folder;
   const auto shown = run_tool(
       folder, "sh",
@@ -338,12 +338,12 @@ std::vector<std::string> installed_units(const TemporaryFolder& folder) {
 TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
   const TemporaryFolder folder;
   if (!is_there(folder, "systemd-analyze")) {
-    GTEST_SKIP() << "there is no systemd-analyze here";
+    GTEST_SKIP() << "systemd-analyze is not installed";
   }
   for (const auto& unit : installed_units(folder)) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
-    EXPECT_EQ(verified.err, "") << unit << ": what it ignores it prints and lets pass";
+    EXPECT_EQ(verified.err, "") << unit << ": systemd-analyze prints settings that it ignores";
     // The threshold is in tenths of systemd's exposure level. The access to network, local sockets
     // and threads that the programs need has the level 1.2.
     const auto judged =

@@ -32,7 +32,7 @@ class InAFolder(unittest.TestCase):
         return done.stdout
 
 
-@unittest.skipUnless(shutil.which("git"), "there is no git here")
+@unittest.skipUnless(shutil.which("git"), "git is not installed")
 class Origin(InAFolder):
     def tree(self, name, commit=None):
         shutil.copytree(TREE / ORIGIN, self.folder / name / ORIGIN)

@@ -49,7 +49,7 @@ def older(package, folder):
 def setUpModule():
     tools = ("dpkg-deb", "dpkg-shlibdeps", "deb-systemd-helper", "systemd-sysusers", "file")
     if missing := [tool for tool in tools if not shutil.which(tool)]:
-        raise unittest.SkipTest(f"there is no {missing[0]} here")
+        raise unittest.SkipTest(f"{missing[0]} is not installed")
     global FOLDER, PACKAGES, VERSION
     FOLDER = tempfile.TemporaryDirectory()
     PACKAGES = pack(pathlib.Path(FOLDER.name))
@@ -95,7 +95,7 @@ class Packages(unittest.TestCase):
 
     def test_the_python_module_depends_on_python_and_numpy_only(self):
         if "python3-oblique" not in PACKAGES:
-            self.skipTest("the Python module is not built here")
+            self.skipTest("the Python module is not built")
         self.assertRegex(field("python3-oblique", "Depends"), r"^python3 \(>= 3\.\d+\), python3 \(<< 3\.\d+\), python3-numpy, libc6")
         self.assertNotRegex(field("python3-oblique", "Depends"), "oblique|pandas")
         self.assertIn("/usr/lib/python3/dist-packages/oblique/__init__.py", files("python3-oblique"))
@@ -141,10 +141,10 @@ class Packages(unittest.TestCase):
 
     def test_lintian_has_no_errors_and_warns_of_nothing(self):
         if not shutil.which("lintian"):
-            self.skipTest("there is no lintian here")
+            self.skipTest("lintian is not installed")
         # Only release builds are shipped; builds with sanitizers or assertions differ from them.
         if "CMAKE_BUILD_TYPE:STRING=Release" not in (BUILD / "CMakeCache.txt").read_text():
-            self.skipTest("what is built is not what is shipped")
+            self.skipTest("only a release build is checked with lintian")
         run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
             "uses-no-compression-for-data-tarball", *PACKAGES.values())
 
@@ -184,10 +184,10 @@ class AtWork(unittest.TestCase):
         return wants / link
 
     def test_an_installation_starts_and_enables_nothing_and_prints_how_to(self):
-        said = self.install(*SERVICES)
+        printed = self.install(*SERVICES)
         for service in SERVICES:
-            self.assertIn(f"{service} is installed and not started.", said)
-            self.assertIn(f"  systemctl enable --now {service}\n", said)
+            self.assertIn(f"{service} is installed and not started.", printed)
+            self.assertIn(f"  systemctl enable --now {service}\n", printed)
         self.assertEqual(list(self.root.glob("etc/systemd/**/*.service")), [])
         state = self.root / "var/lib/oblique"
         self.assertEqual(state.stat().st_mode & 0o777, 0o750)
@@ -198,10 +198,10 @@ class AtWork(unittest.TestCase):
         self.install(*(older(service, self.folder) for service in SERVICES))
         mine = self.root / "etc/oblique/server.toml"
         mine.write_text("# mine\n")
-        said = self.install(*SERVICES)
+        printed = self.install(*SERVICES)
         self.assertEqual(mine.read_text(), "# mine\n")
         self.assertNotIn("0.0.1", (self.root / "etc/oblique/worker.toml").read_text())
-        self.assertNotIn("not started", said)
+        self.assertNotIn("not started", printed)
 
     def test_databases_and_keys_survive_upgrade_removal_and_purge(self):
         self.install(older("oblique-server", self.folder), older("oblique-worker", self.folder))
@@ -212,9 +212,9 @@ class AtWork(unittest.TestCase):
         self.dpkg("--remove", *SERVICES)
         self.assertTrue((self.root / "etc/oblique/server.toml").exists())
         self.assertFalse((self.root / "usr/bin/oblique-server").exists())
-        said = self.dpkg("--purge", *SERVICES)
-        self.assertIn("/var/lib/oblique is not removed", said)
-        self.assertIn("/etc/oblique/worker.key is not removed", said)
+        printed = self.dpkg("--purge", *SERVICES)
+        self.assertIn("/var/lib/oblique is not removed", printed)
+        self.assertIn("/etc/oblique/worker.key is not removed", printed)
         self.assertFalse((self.root / "etc/oblique/server.toml").exists())
         self.install(*SERVICES)
         self.assertEqual([file.read_text() for file in kept], [file.name for file in kept])
@@ -222,9 +222,9 @@ class AtWork(unittest.TestCase):
 
     def test_a_downgrade_prints_its_consequences(self):
         self.install(*SERVICES)
-        said = self.install(*(older(service, self.folder) for service in SERVICES))
-        self.assertIn(f"oblique-server is downgraded from {VERSION} to 0.0.1.", said)
-        self.assertIn("then use an older copy", said)
+        printed = self.install(*(older(service, self.folder) for service in SERVICES))
+        self.assertIn(f"oblique-server is downgraded from {VERSION} to 0.0.1.", printed)
+        self.assertIn("then use an older copy", printed)
         self.assertNotIn("is downgraded", self.install(*SERVICES))
 
     def test_services_stay_enabled_after_a_removal_but_not_after_a_purge(self):

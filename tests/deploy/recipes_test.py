@@ -88,14 +88,14 @@ class StudyFromAScript(Recipe):
     def test_it_submits_waits_and_queries_and_its_exit_code_is_the_studys(self):
         url, workers = self.start_server()
         self.start("oblique-worker", "--server", workers)
-        said = self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url)
-        self.assertRegex(said, r"^friction: 16 points, 0 done\nlargest normal force of friction: \d{4}\.\d+ N\n$")
+        printed = self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url)
+        self.assertRegex(printed, r"^friction: 16 points, 0 done\nlargest normal force of friction: \d{4}\.\d+ N\n$")
         rows = self.rows_of("friction.csv")
         self.assertEqual([round(float(r["mu"]), 9) for r in rows], [0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.4, 1.6])
-        self.assertEqual(max(float(r["fn_peak_N"]) for r in rows), float(said.split()[-2]))
+        self.assertEqual(max(float(r["fn_peak_N"]) for r in rows), float(printed.split()[-2]))
         # A second run solves no point again and prints the same result.
         self.assertEqual(self.run_in_folder("sh", "study.sh", "friction", OBLIQUE_SERVER=url),
-                         said.replace(" 0 done", " 16 done; the server already had it"))
+                         printed.replace(" 0 done", " 16 done; the server already had it"))
         # A cancelled study is not done: exit code 1.
         self.run_in_folder("oblique", "submit", "--name", "long", "--preset", "paper", "--H", "1", "--mu", "0.1:2:1000", "--e",
                            "0.5:1:1000", OBLIQUE_SERVER=url)
@@ -126,8 +126,8 @@ class FiguresOfThePaper(Recipe):
     NEEDS = "matplotlib", "numpy", "oblique"
 
     def test_they_are_drawn_and_the_largest_forces_are_the_published_ones(self):
-        said = self.run_in_folder(PYTHON, "paper_figures.py")
-        lines = said.splitlines()
+        printed = self.run_in_folder(PYTHON, "paper_figures.py")
+        lines = printed.splitlines()
         self.assertEqual(len(lines), 11)
         for line in lines[1:-1]:
             *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())

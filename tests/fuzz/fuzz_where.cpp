@@ -64,7 +64,7 @@ void expect_no_row(oblique::server::Reader& database, const std::string& conditi
 
 /// Uses the text as one part of a query. The length of the text selects the part. Planning the
 /// query must succeed or throw an InputError.
-void ask(sqlite3* database, const std::string& text) {
+void plan_query(sqlite3* database, const std::string& text) {
   constexpr std::size_t kParts = 4;
   oblique::protocol::StudyQuery question;
   question.set_study("a");
@@ -95,7 +95,7 @@ void ask(sqlite3* database, const std::string& text) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Opened& files = opened();
   const std::string condition(reinterpret_cast<const char*>(data), size);
-  ask(files.database.get(), condition);
+  plan_query(files.database.get(), condition);
   try {
     if (is_taken(condition)) {
       expect_no_row(files.reader, condition);

@@ -26,7 +26,7 @@ WorkerMessage results_message() {
   return message;
 }
 
-TEST(FramesTest, AMessageComesBackFromItsFrame) {
+TEST(FramesTest, AMessageIsTheSameAfterEncodingAndDecoding) {
   const WorkerMessage sent = results_message();
   WorkerMessage received;
   ASSERT_TRUE(decode(encode(sent), received));
@@ -124,15 +124,17 @@ TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedUnlessItIsATrace) {
   trace.mutable_values()->Resize(static_cast<int>(kMaxFrameBytes / sizeof(double)) - 100'000, 1.0);
   EXPECT_TRUE(is_worker_frame_within_limits(encode(message)));
   trace.mutable_values()->Resize(static_cast<int>(kMaxFrameBytes / sizeof(double)), 1.0);
-  EXPECT_FALSE(is_worker_frame_within_limits(encode(message))) << "longer than any frame";
+  EXPECT_FALSE(is_worker_frame_within_limits(encode(message)))
+      << "the trace is longer than any frame";
   trace.clear_values();
   while (trace.ByteSizeLong() <= kMaxWorkerFrameBytes) {
     trace.mutable_result()->add_texts(std::string(100'000, 'S'));
   }
-  EXPECT_FALSE(is_worker_frame_within_limits(encode(message))) << "these are no rows";
+  EXPECT_FALSE(is_worker_frame_within_limits(encode(message)))
+      << "only rows of a trace may make a frame so long";
 }
 
-TEST(FrameScanTest, ARecipeWithRoomForItsAxesPasses) {
+TEST(FrameScanTest, ARecipeWithoutPaddingPasses) {
   EXPECT_TRUE(is_unpadded_request(encode(submission())));
   ClientRequest query;
   query.mutable_query()->set_sql("SELECT 1");
@@ -148,7 +150,7 @@ TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
   }
   EXPECT_FALSE(is_unpadded_request(encode(blocks)));
   EXPECT_FALSE(is_unpadded_request(encode(axes)));
-  EXPECT_FALSE(is_unpadded_request(std::string("\x1a\x7f", 2))) << "cut off";
+  EXPECT_FALSE(is_unpadded_request(std::string("\x1a\x7f", 2))) << "the frame is truncated";
 }
 
 TEST(FrameScanTest, ARecipeInAFileIsCheckedLikeOneInARequest) {
@@ -163,7 +165,7 @@ TEST(FrameScanTest, ARecipeInAFileIsCheckedLikeOneInARequest) {
 TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
   const std::string frame = encode(submission());
   EXPECT_EQ(request_id_of(frame), 77U);
-  EXPECT_EQ(request_id_of(frame.substr(0, 8)), 77U) << "the rest is of no matter";
+  EXPECT_EQ(request_id_of(frame.substr(0, 8)), 77U) << "the request number is in the first 8 bytes";
   EXPECT_EQ(request_id_of(""), 0U);
   EXPECT_EQ(request_id_of("\xff\xff"), 0U);
 }

@@ -52,7 +52,7 @@ solver::CaseResult distinct_result() {
   return result;
 }
 
-TEST(PointResultTest, AResultComesBackFromItsFrame) {
+TEST(PointResultTest, AResultIsTheSameAfterEncodingAndDecoding) {
   const auto sent = distinct_result();
   PointResult message;
   ASSERT_TRUE(decode(encode(to_message(42, sent)), message));
@@ -69,7 +69,7 @@ TEST(PointResultTest, AResultComesBackFromItsFrame) {
   EXPECT_EQ(received.phases.at(1).t0_s, 6.8e-5);
   EXPECT_FALSE(received.peaks.at(1).major);
   EXPECT_TRUE(received.peaks.at(2).major);
-  EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "every other member";
+  EXPECT_EQ(encode(to_message(42, received)), encode(message)) << "the remaining members are equal";
 }
 
 TEST(PointResultTest, MissingOutputsStayMissing) {
@@ -97,17 +97,17 @@ TEST(PointResultTest, AFailedPointAlwaysHasAReason) {
 TEST(PointResultTest, ANumberThatCannotBeStoredIsDetectedInEveryField) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const PointResult sound = to_message(0, distinct_result());
-  for (const auto& [number, says] : {std::pair{kNotANumber, "is not a finite number"},
-                                     {kInfinity, "is not a finite number"},
-                                     {1e308, "too large to be stored"},
-                                     {-1.1e100, "too large to be stored"}}) {
+  for (const auto& [number, expected] : {std::pair{kNotANumber, "is not a finite number"},
+                                         {kInfinity, "is not a finite number"},
+                                         {1e308, "too large to be stored"},
+                                         {-1.1e100, "too large to be stored"}}) {
     int i = 0;
     solver::for_each_sent<double>(
-        [&, number = number, says = says](const auto& field, const auto& member) {
+        [&, number = number, expected = expected](const auto& field, const auto& member) {
           PointResult message = sound;
           message.set_reals(i++, number);
           const bool is_absent = member.may_be_absent && std::isnan(number);
-          EXPECT_THAT(fault_of(message), HasSubstr(is_absent ? "" : says)) << field.name;
+          EXPECT_THAT(fault_of(message), HasSubstr(is_absent ? "" : expected)) << field.name;
         });
     for (auto* (PointResult::*list)() :
          {&PointResult::mutable_peaks, &PointResult::mutable_ft_peaks,
@@ -115,7 +115,7 @@ TEST(PointResultTest, ANumberThatCannotBeStoredIsDetectedInEveryField) {
           &PointResult::mutable_reaction_peaks}) {
       PointResult message = sound;
       (message.*list)()->Set(1, number);
-      EXPECT_THAT(fault_of(message), HasSubstr(says));
+      EXPECT_THAT(fault_of(message), HasSubstr(expected));
     }
   }
   PointResult largest = sound;
@@ -157,7 +157,7 @@ TEST(PointResultTest, InvalidResultsAreRefused) {
   verbose.set_texts(0, std::string(65537, 'S'));
   EXPECT_THAT(fault_of(verbose), HasSubstr("too long"));
   EXPECT_THAT(fault_of(failed_point(0, std::string(65537, 'x'))), HasSubstr("too long"));
-  EXPECT_NE(fault_of(PointResult()), "") << "as one of an earlier protocol version would read";
+  EXPECT_NE(fault_of(PointResult()), "") << "an empty result is invalid";
 }
 
 }  // namespace

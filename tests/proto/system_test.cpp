@@ -22,7 +22,7 @@ using testing::StartsWith;
 
 class SmallFile : public testing::Test {
  protected:
-  std::string objection_to(const std::string& path) const {
+  std::string error_for(const std::string& path) const {
     try {
       read_small_file(path, "the list", 10);
       return "";
@@ -44,14 +44,14 @@ TEST_F(SmallFile, IsReadCompletelyAndTheNullDeviceIsEmpty) {
 }
 
 TEST_F(SmallFile, IsRefusedWithoutBlockingIfMissingTooLongOrNotRegular) {
-  EXPECT_THAT(objection_to(file_), HasSubstr("No such file"));
-  EXPECT_THAT(objection_to("/dev/zero"), HasSubstr("it is a device, "));
-  EXPECT_THAT(objection_to(folder_.path().string()), HasSubstr("it is a directory, "));
+  EXPECT_THAT(error_for(file_), HasSubstr("No such file"));
+  EXPECT_THAT(error_for("/dev/zero"), HasSubstr("it is a device, "));
+  EXPECT_THAT(error_for(folder_.path().string()), HasSubstr("it is a directory, "));
   std::ofstream(file_) << std::string(11, 'x');
-  EXPECT_THAT(objection_to(file_), HasSubstr("it has 11 bytes, and at most 10 are allowed"));
+  EXPECT_THAT(error_for(file_), HasSubstr("it has 11 bytes, and at most 10 are allowed"));
   const std::string pipe = folder_.file("pipe");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_THAT(objection_to(pipe),
+  EXPECT_THAT(error_for(pipe),
               HasSubstr("it is a pipe, and must be a regular file of at most 10 bytes"));
 }
 
@@ -78,7 +78,7 @@ TEST(Address, NeedsAValidPortAndBracketsAroundIpv6) {
   EXPECT_NE(address_error("tcp://::1:7601").find("brackets"), std::string::npos);
 }
 
-TEST(Address, NamesAHost) {
+TEST(Address, MayContainTheNameOfAHost) {
   EXPECT_EQ(host_of("tcp://127.0.0.1:7600"), "127.0.0.1");
   EXPECT_EQ(host_of("tcp://coordinator:7600"), "coordinator");
   EXPECT_EQ(host_of("tcp://[fe80::1%eth0]:7600"), "fe80::1%eth0");

@@ -260,24 +260,24 @@ class SimulatedWorker {
 
 using server::StudyState;
 
-/// Returns a recipe of `points` points with this H. Each model has `points_a_model` points; the
+/// Returns a recipe of `points` points with this H. Each model has `points_per_model` points; the
 /// last one has the rest. E determines the fall and cycles through three values, so models with the
 /// same fall are not neighbours.
-inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_a_model,
+inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t points_per_model,
                                          double H) {
   using protocol::listed;
   using protocol::range;
   const auto axis = [](const char* key, double from, double to, std::uint64_t count) {
     return count == 1 ? listed(key, {from}) : range(key, from, to, count);
   };
-  const std::uint64_t models = points / points_a_model;
-  const std::uint64_t rest = points % points_a_model;
+  const std::uint64_t models = points / points_per_model;
+  const std::uint64_t rest = points % points_per_model;
   std::vector<std::vector<protocol::Axis>> blocks;
   if (models > 0) {
     blocks.push_back(
         {axis("k", 1e7, 2e7, models),
          protocol::following("E", "6e10 + 1e9 * (floor(k / 3e5) - 3 * floor(floor(k / 3e5) / 3))"),
-         listed("H", {H}), axis("mu", 0.5, 1.0, points_a_model), listed("e", {1.0})});
+         listed("H", {H}), axis("mu", 0.5, 1.0, points_per_model), listed("e", {1.0})});
   }
   if (rest > 0) {
     blocks.push_back({listed("H", {H}), axis("mu", 0.0, 0.4, rest), listed("e", {1.0})});
@@ -286,8 +286,8 @@ inline protocol::Recipe recipe_of_models(std::uint64_t points, std::uint64_t poi
 }
 
 /// Adds `filter` to each block of `recipe`. Returns nothing if it leaves out all points of a block.
-inline std::optional<protocol::PointTable> filtered_here_and_there(protocol::Recipe recipe,
-                                                                   const char* filter) {
+inline std::optional<protocol::PointTable> filtered_table(protocol::Recipe recipe,
+                                                          const char* filter) {
   for (protocol::Block& block : *recipe.mutable_blocks()) {
     block.set_where(filter);
   }
@@ -319,9 +319,9 @@ class SimulatedClient {
     connect();
     world_.after(world_.between(0, 5000), [this] {
       ++request_;
-      ask();
+      send_request();
     });
-    world_.after(world_.between(3000, 20'000), [this] { change_mind(); });
+    world_.after(world_.between(3000, 20'000), [this] { begin_next_request(); });
   }
 
   const std::string& name() const { return name_; }
@@ -356,15 +356,15 @@ class SimulatedClient {
   /// Appends `points` points to the recipe, which is empty at first. A filter may leave out some.
   void set_recipe(std::uint64_t points) {
     points_ += points;
-    const std::uint64_t points_a_model = world_.chance(0.3) ? points + 1
-                                         : world_.chance(0.5)
-                                             ? std::uint64_t{1}
-                                             : static_cast<std::uint64_t>(world_.between(2, 40));
-    const protocol::Recipe recipe = recipe_of_models(points, points_a_model, marked_H(mark_));
+    const std::uint64_t points_per_model = world_.chance(0.3) ? points + 1
+                                           : world_.chance(0.5)
+                                               ? std::uint64_t{1}
+                                               : static_cast<std::uint64_t>(world_.between(2, 40));
+    const protocol::Recipe recipe = recipe_of_models(points, points_per_model, marked_H(mark_));
     if (world_.chance(0.4)) {
       const char* filter = world_.chance(0.3) ? "sin(1234.5 * mu + k) > 0.9"  // few points pass
                                               : "sin(1234.5 * mu + k) > -0.3";
-      if (const auto table = filtered_here_and_there(recipe, filter)) {
+      if (const auto table = filtered_table(recipe, filter)) {
         recipe_.mutable_blocks()->MergeFrom(table->recipe().blocks());
         for (std::uint64_t point = 0; point < points; ++point) {
           left_in_ += table->passes_filter(point) ? 1U : 0U;
@@ -380,7 +380,7 @@ class SimulatedClient {
     set_recipe(appended_);
   }
   /// Makes a new study with the name of the deleted one.
-  void begin_anew() {
+  void replace_deleted_study() {
     acknowledged_ = false;
     study_id_ = 0;
     mark_ += kClients;
@@ -389,7 +389,7 @@ class SimulatedClient {
     left_in_ = 0;
     set_recipe(static_cast<std::uint64_t>(world_.between(1, 300)));
   }
-  void ask() {
+  void send_request() {
     if (is_answered_) {
       return;
     }
@@ -406,9 +406,9 @@ class SimulatedClient {
     } else if (intent_ == Intent::kChange) {
       request.mutable_change()->set_study(name_);
       // Draws one of cancel, pause, resume and retry.
-      const auto asked = static_cast<protocol::StudyChange>(world_.between(1, 4));
-      request.mutable_change()->set_change(asked);
-      expect(asked);
+      const auto change = static_cast<protocol::StudyChange>(world_.between(1, 4));
+      request.mutable_change()->set_change(change);
+      expect(change);
     } else {
       expect(protocol::STUDY_CHANGE_RESUME);
       request.mutable_submit()->set_name(name_);
@@ -425,7 +425,7 @@ class SimulatedClient {
     world_.after(2000, [this, number = request_] {
       if (number == request_ && !is_answered_) {
         connect();
-        ask();
+        send_request();
       }
     });
   }
@@ -447,10 +447,10 @@ class SimulatedClient {
       }
       if (reply.submit().points() != points_ ||
           (reply.submit().appended() != 0 && reply.submit().appended() != appended_)) {
-        throw Violation("a study of " + std::to_string(points_) + " points, of which " +
-                        std::to_string(appended_) + " were appended, is called one of " +
-                        std::to_string(reply.submit().points()) + " and " +
-                        std::to_string(reply.submit().appended()));
+        throw Violation("a study of " + std::to_string(points_) + " points, " +
+                        std::to_string(appended_) + " of them appended, is reported as " +
+                        std::to_string(reply.submit().points()) + " points, " +
+                        std::to_string(reply.submit().appended()) + " appended");
       }
       acknowledged_ = true;
       study_id_ = reply.submit().study_id();
@@ -465,21 +465,21 @@ class SimulatedClient {
       return;
     }
     if (intent_ == Intent::kDelete) {
-      begin_anew();
+      replace_deleted_study();
       return;
     }
-    const std::string& told = reply.change().study().state();
+    const std::string& state_name_of_reply = reply.change().study().state();
     for (const StudyState state :
          {StudyState::kRunning, StudyState::kPaused, StudyState::kCancelled}) {
-      if (told == server::state_name(state)) {
+      if (state_name_of_reply == server::state_name(state)) {
         // If several changes are pending, the state may come from any of them.
-        possible_ = asked_.size() > 1 ? std::nullopt : std::optional(std::set{state});
+        possible_ = requested_.size() > 1 ? std::nullopt : std::optional(std::set{state});
         return;
       }
     }
     possible_.reset();
   }
-  void change_mind() {
+  void begin_next_request() {
     // After the end of faults the client submits the study for the last time.
     const bool last = !world_.faults;
     if (is_answered_ && (!last || intent_ != Intent::kSubmit)) {
@@ -501,20 +501,20 @@ class SimulatedClient {
         ++growths;
       }
       is_answered_ = false;
-      asked_.clear();
+      requested_.clear();
       ++request_;
-      ask();
+      send_request();
     }
     if (!last || !is_answered_ || intent_ != Intent::kSubmit) {
-      world_.after(world_.between(500, 4000), [this] { change_mind(); });
+      world_.after(world_.between(500, 4000), [this] { begin_next_request(); });
     }
   }
-  void expect(protocol::StudyChange asked) {
-    asked_.insert(asked);
+  void expect(protocol::StudyChange change) {
+    requested_.insert(change);
     if (possible_) {
-      possible_->insert(asked == protocol::STUDY_CHANGE_CANCEL  ? StudyState::kCancelled
-                        : asked == protocol::STUDY_CHANGE_PAUSE ? StudyState::kPaused
-                                                                : StudyState::kRunning);
+      possible_->insert(change == protocol::STUDY_CHANGE_CANCEL  ? StudyState::kCancelled
+                        : change == protocol::STUDY_CHANGE_PAUSE ? StudyState::kPaused
+                                                                 : StudyState::kRunning);
     }
   }
 
@@ -535,7 +535,7 @@ class SimulatedClient {
   Intent intent_ = Intent::kSubmit;  // purpose of the last request
   bool is_answered_ = false;         // the last request was answered
   // changes sent under this request number: a repeated request may contain another change
-  std::set<protocol::StudyChange> asked_;
+  std::set<protocol::StudyChange> requested_;
   /// States that the study may have, besides done: the last acknowledged one and those requested
   /// since. Without a value all states are possible.
   std::optional<std::set<server::StudyState>> possible_;

@@ -58,7 +58,7 @@ class Simulation {
       outcome_["deletions"] += client->deletions;
     }
     outcome_["cleared rows"] = disk_.cleared_rows;
-    outcome_["vanished peers"] = vanished_;
+    outcome_["vanished peers"] = vanished_with_points_;
     outcome_["server kills"] = server_.crashes - server_.power_losses;
     outcome_["power losses"] = server_.power_losses;
     outcome_["deaths in writes"] = server_.deaths_in_writes;
@@ -96,14 +96,14 @@ class Simulation {
     const auto wait_ms = settings_.storms ? world_.between(20, 400) : world_.between(100, 3000);
     world_.after(wait_ms, [this] {
       if (world_.faults) {
-        settings_.storms ? blow() : fault();
+        settings_.storms ? storm_fault() : fault();
         plan_faults();
       }
     });
   }
 
   /// Causes one fault of a storm. The first worker is only disconnected, never killed or frozen.
-  void blow() {
+  void storm_fault() {
     const std::int64_t last = static_cast<std::int64_t>(workers_.size()) - 1;
     SimulatedWorker& victim = *workers_[static_cast<std::size_t>(world_.between(1, last))];
     switch (world_.between(0, 4)) {
@@ -121,33 +121,34 @@ class Simulation {
         ++outcome_["cuts"];
         break;
       default:
-        come_and_vanish();
+        add_vanishing_peer();
         break;
     }
   }
 
   /// Adds a peer that joins as a worker under a new name, requests many batches and disappears.
-  void come_and_vanish() {
+  void add_vanishing_peer() {
     constexpr std::uint64_t kFirstPeer = 1000;  // higher than the number of any worker
-    ++came_;
+    ++vanishing_peers_;
     const auto has_points = std::make_shared<bool>(false);
-    const auto link = workers_network_.open(kFirstPeer + came_, [has_points](const auto& frame) {
-      protocol::ServerToWorker message;
-      *has_points = *has_points || (protocol::decode(frame, message) && message.has_batch() &&
-                                    message.batch().study_id() != 0);
-    });
+    const auto link =
+        workers_network_.open(kFirstPeer + vanishing_peers_, [has_points](const auto& frame) {
+          protocol::ServerToWorker message;
+          *has_points = *has_points || (protocol::decode(frame, message) && message.has_batch() &&
+                                        message.batch().study_id() != 0);
+        });
     protocol::WorkerMessage hello;
     protocol::set_protocol(*hello.mutable_hello());
     hello.mutable_hello()->set_solver_version("1");
     hello.mutable_hello()->set_threads(1);
-    hello.mutable_hello()->set_process_id("vanishing " + std::to_string(came_));
+    hello.mutable_hello()->set_process_id("vanishing " + std::to_string(vanishing_peers_));
     protocol::WorkerMessage credit;
     credit.mutable_credit()->set_batches(1000);
     workers_network_.send(link, protocol::encode(hello), false);
     workers_network_.send(link, protocol::encode(credit), false);
     world_.after(world_.between(10, 500), [this, link, has_points] {
       workers_network_.close(link, false);
-      vanished_ += *has_points ? 1U : 0U;
+      vanished_with_points_ += *has_points ? 1U : 0U;
     });
   }
 
@@ -308,7 +309,7 @@ class Simulation {
       }
       check_rows(client->mark(), results);
       if (study->state != server::StudyState::kDone) {
-        throw Violation(client->name() + " is complete and not done");
+        throw Violation(client->name() + " has all rows but is not done");
       }
       if (counts.leased != 0) {
         throw Violation("a lease of " + client->name() + " leaked");
@@ -342,8 +343,8 @@ class Simulation {
   Network clients_network_;
   std::vector<std::unique_ptr<SimulatedClient>> clients_;
   std::vector<std::unique_ptr<SimulatedWorker>> workers_;
-  std::uint64_t came_ = 0;      // number of peers that disappear
-  std::uint64_t vanished_ = 0;  // number of these that had received a batch of a study
+  std::uint64_t vanishing_peers_ = 0;       // number of peers that disappear
+  std::uint64_t vanished_with_points_ = 0;  // number of these that had received a batch of a study
   SimulationOutcome outcome_;
 };
 

@@ -71,7 +71,7 @@ TEST(StormsTest, NoPointFailsBecauseOfLostWorkersIfOneWorkerIsSound) {
   EXPECT_GT(all["vanished peers"], count / 2);
 }
 
-TEST(SeedTest, RepeatsARun) {
+TEST(SeedTest, TheSameSeedRepeatsARunExactly) {
   EXPECT_EQ(simulate(7, {}), simulate(7, {}));
 }
 

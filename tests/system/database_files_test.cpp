@@ -68,7 +68,7 @@ TEST_F(DatabaseFilesTest, AServerWhoseDatabaseIsDeletedReportsThisAndExitsWith1)
   fs::remove(file_);
   EXPECT_EQ(server.process().wait(), 1);
   EXPECT_TRUE(contains(server.process().err(), file_ + " was deleted")) << server.process().err();
-  EXPECT_TRUE(is_running(worker.pid())) << "it keeps unacknowledged results";
+  EXPECT_TRUE(is_running(worker.pid())) << "a worker keeps unacknowledged results";
 }
 
 TEST_F(DatabaseFilesTest, ARunWhoseDatabaseIsReplacedFailsWithThatReason) {

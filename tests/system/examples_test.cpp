@@ -43,7 +43,7 @@ class Examples : public testing::TestWithParam<Example> {};
 
 TEST_P(Examples, PrintTheSameNumbersAsTheClient) {
   if (std::system((GetParam().needs + " > /dev/null 2>&1").c_str()) != 0) {
-    GTEST_SKIP() << "this fails here: " << GetParam().needs;
+    GTEST_SKIP() << "the example cannot run because this command fails: " << GetParam().needs;
   }
   const TemporaryFolder folder;
   const Outcome ran =

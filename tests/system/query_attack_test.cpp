@@ -12,7 +12,8 @@ namespace oblique::test {
 namespace {
 
 /// A statement that compares bytes for hours, during which SQLite does not check for interrupts.
-constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
+constexpr const char* kUninterruptible =
+    "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 class QueryAttackTest : public testing::Test {
  protected:
@@ -24,9 +25,9 @@ class QueryAttackTest : public testing::Test {
   }
   void expect_answers() {
     for (int i = 0; i < 3; ++i) {
-      const Outcome asked = run_oblique(folder_, asking("SELECT 1 AS one"));
-      EXPECT_EQ(asked.exit_code, 0) << asked.err;
-      EXPECT_EQ(asked.out, "one\n1\n");
+      const Outcome outcome = run_oblique(folder_, asking("SELECT 1 AS one"));
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+      EXPECT_EQ(outcome.out, "one\n1\n");
       EXPECT_EQ(run_oblique(folder_, {"status", "--server", server_.client_url()}).exit_code, 0);
     }
   }
@@ -41,7 +42,7 @@ class QueryAttackTest : public testing::Test {
 
 TEST_F(QueryAttackTest, QuickQueriesWaitForSlowOnesUntilTheirDeadline) {
   for (int i = 0; i < 6; ++i) {
-    attack(kDeaf, "2");
+    attack(kUninterruptible, "2");
   }
   wait_for_readers(4);
   expect_answers();
@@ -52,7 +53,7 @@ TEST_F(QueryAttackTest, QuickQueriesWaitForSlowOnesUntilTheirDeadline) {
 }
 
 TEST_F(QueryAttackTest, ReadersEndWithAKilledServer) {
-  attack(kDeaf);
+  attack(kUninterruptible);
   wait_for_readers(1);
   const auto readers = children_of(server_.process().pid());
   server_.process().send(SIGKILL);

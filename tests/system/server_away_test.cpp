@@ -25,8 +25,8 @@ class ServerAwayTest : public ::testing::Test {
     return {"watch", "many", "--server", server_->client_url()};
   }
 
-  static void wait_until_said(const Process& client, const std::string& words) {
-    wait_until("the client says: " + words,
+  static void wait_until_printed(const Process& client, const std::string& words) {
+    wait_until("the client prints: " + words,
                [&] { return client.err().find(words) != std::string::npos; });
   }
 
@@ -44,17 +44,17 @@ class ServerAwayTest : public ::testing::Test {
 
 TEST_F(ServerAwayTest, WatchingContinuesAfterTheServerIsKilledAndRestarted) {
   Process submitting(folder_, client_program(), submit_and_watch());
-  wait_until_said(submitting, "waits for a worker");
+  wait_until_printed(submitting, "waits for a worker");
   Process watching(folder_, client_program(), watch());
-  wait_until_said(watching, "waits for a worker");
+  wait_until_printed(watching, "waits for a worker");
   kill_server();
   for (const Process* client : {&submitting, &watching}) {
-    wait_until_said(*client, "no answer from " + server_->client_url());
+    wait_until_printed(*client, "no answer from " + server_->client_url());
   }
   start_server_again();
   const Worker worker(folder_, server_->worker_url());
   for (Process* client : {&submitting, &watching}) {
-    wait_until_said(*client, "answers again");
+    wait_until_printed(*client, "answers again");
     EXPECT_EQ(client->wait(), 0) << client->err();
   }
   EXPECT_EQ(Database(database_).rows(), kManyPoints);
@@ -70,7 +70,7 @@ TEST_F(ServerAwayTest, AServerThatNeverAnsweredIsNotWaitedFor) {
   }
 }
 
-TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
+TEST_F(ServerAwayTest, ASignalEndsWatchingWithTheExitCodeOfTheSignal) {
   for (const bool is_away : {false, true}) {
     std::vector<std::unique_ptr<Process>> clients;
     for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
@@ -86,14 +86,14 @@ TEST_F(ServerAwayTest, ASignalEndsWatchingWithItsNumberWithOrWithoutAServer) {
       });
     }
     for (const auto& client : clients) {
-      wait_until_said(*client, "many: 0 of");
+      wait_until_printed(*client, "many: 0 of");
     }
     if (is_away) {
       kill_server();
     }
     for (std::size_t i = 0; i < clients.size(); ++i) {
       if (is_away) {
-        wait_until_said(*clients[i], "no answer from");
+        wait_until_printed(*clients[i], "no answer from");
       }
       const int signal = i < 2 ? SIGINT : SIGTERM;
       clients[i]->send(signal);

@@ -51,12 +51,12 @@ Fallen fall_of(const solver::ModelParameters& model) {
 /// Returns the results of `points` in the order of the points. Throws SolveError if a point fails.
 std::vector<CaseResult> contacts_of(const solver::Finger& finger,
                                     const std::vector<ContactPoint>& points) {
-  std::vector<solver::Point> asked;
+  std::vector<solver::Point> solver_points;
   for (const ContactPoint& point : points) {
-    asked.push_back({point.H_m, point.mu, point.e_star});
+    solver_points.push_back({point.H_m, point.mu, point.e_star});
   }
   std::vector<CaseResult> results;
-  for (solver::Outcome& outcome : solver::solve_points(finger, asked)) {
+  for (solver::Outcome& outcome : solver::solve_points(finger, solver_points)) {
     if (!outcome.result) {
       throw solver::SolveError(outcome.error);
     }

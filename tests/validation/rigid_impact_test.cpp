@@ -74,7 +74,7 @@ constexpr std::array<Regime, 5> kRegimes{{{"slip throughout", "sC sR", 0.3, 3.0}
                                           {"stick that slips in compression", "SC sC sR", 0.5, 3.0},
                                           {"slip the other way", "sC sR", 0.1, -1.0}}};
 
-TEST(RigidImpact, ContactMachineFollowsTheClosedFormInEachRegime) {
+TEST(RigidImpact, TheContactFollowsTheClosedFormInEachRegime) {
   for (const Regime& regime : kRegimes) {
     const RigidImpact::Parameters p = flying_rod(regime.mu, 0.7, regime.vt_m_s);
     const RigidImpact right(p);

@@ -191,7 +191,7 @@ TEST_F(ConversationTest, ResultsForOneDatabaseAreNeverSentToAnother) {
   EXPECT_EQ(conversation_->unacknowledged_results(), 0U);
 }
 
-TEST_F(ConversationTest, APointSolvedAfterTheDatabaseChangedIsNotSentEither) {
+TEST_F(ConversationTest, APointSolvedAfterAChangeOfTheDatabaseIsNotSent) {
   join_with_batch();
   rejoin("another");
   receive(study_message(7));

@@ -98,7 +98,8 @@ TEST_F(ConversationTest, AnUnansweredHelloIsRepeatedAfterAPauseThatDoublesToTwoS
     pass(1);
     patience_ms = std::min<std::int64_t>(2 * patience_ms, 12'000);
     EXPECT_FALSE(has<Connect>());
-    EXPECT_EQ(has<Note>() && effects_of<Note>()[0].is_warning, backoff_ms == 50) << "warned once";
+    EXPECT_EQ(has<Note>() && effects_of<Note>()[0].is_warning, backoff_ms == 50)
+        << "the warning is logged once";
     EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + backoff_ms);
     pass(backoff_ms);
     EXPECT_TRUE(has<Connect>());
@@ -107,20 +108,20 @@ TEST_F(ConversationTest, AnUnansweredHelloIsRepeatedAfterAPauseThatDoublesToTwoS
 }
 
 TEST_F(ConversationTest, ARepeatedRejectionIsLoggedInFullOnceUntilTheNextWelcome) {
-  const auto told = [this] { return effects_of<Note>().at(0).text; };
+  const auto logged = [this] { return effects_of<Note>().at(0).text; };
   start();
   take(conversation_->on_rejected("not listed", now_ms_));
-  EXPECT_EQ(told(), "not listed: trying again in 2 s");
+  EXPECT_EQ(logged(), "not listed: trying again in 2 s");
   pass(2000);
   take(conversation_->on_rejected("not listed", now_ms_));
-  EXPECT_EQ(told(), "still refused, trying again in 4 s");
+  EXPECT_EQ(logged(), "still refused, trying again in 4 s");
   pass(4000);
   take(conversation_->on_rejected("no room", now_ms_));
-  EXPECT_EQ(told(), "no room: trying again in 8 s");
+  EXPECT_EQ(logged(), "no room: trying again in 8 s");
   pass(8000);
   receive(welcome_message());
   take(conversation_->on_rejected("no room", now_ms_));
-  EXPECT_EQ(told(), "no room: trying again in 2 s");
+  EXPECT_EQ(logged(), "no room: trying again in 2 s");
 }
 
 TEST_F(ConversationTest, AfterAWelcomeTheTimeoutIsThreeSecondsAgain) {

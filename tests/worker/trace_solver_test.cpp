@@ -88,7 +88,7 @@ std::vector<double> times_of(std::uint64_t every, int instants, std::size_t most
   return times;
 }
 
-TEST(TraceRowsTest, ContainTheFallEachKthInstantAllEndsOfPhasesAndTheLastInstant) {
+TEST(TraceRowsTest, RowsAreTheFallEachKthInstantAllEndsOfPhasesAndTheLastInstant) {
   protocol::Trace trace;
   EXPECT_EQ(times_of(10, 39, 100, trace),
             (std::vector<double>{-3, -2, -1, 0, 10, 13, 20, 26, 30, 38}));
@@ -98,7 +98,7 @@ TEST(TraceRowsTest, ContainTheFallEachKthInstantAllEndsOfPhasesAndTheLastInstant
   EXPECT_EQ(times_of(1, 39, 42, trace).size(), 42U);
 }
 
-TEST(TraceRowsTest, TooManyAreRefusedWithAKThatFits) {
+TEST(TraceRowsTest, TooManyRowsAreRefusedWithAnIntervalThatFits) {
   for (const auto& [every, instants, most] :
        {std::tuple{std::uint64_t{1}, 39, std::size_t{41}}, {1, 100'000, 500}, {7, 10'000, 20}}) {
     protocol::Trace refused;
@@ -110,14 +110,14 @@ TEST(TraceRowsTest, TooManyAreRefusedWithAKThatFits) {
   }
 }
 
-TEST(TraceRowsTest, IfNoKFitsTheAnswerIsOneBeyondAllInstants) {
+TEST(TraceRowsTest, IfNoIntervalFitsTheAnswerExceedsTheNumberOfInstants) {
   protocol::Trace trace;
   // The rows of the fall, the ends of phases and the last row are already more than 5 rows.
   EXPECT_TRUE(times_of(1, 100, 5, trace).empty());
   EXPECT_EQ(trace.every(), trace.instants() + 1);
 }
 
-TEST(TraceRowsTest, WithoutKTheSmallestPowerOfTwoThatFitsIsChosen) {
+TEST(TraceRowsTest, WithoutAnIntervalTheSmallestPowerOfTwoThatFitsIsChosen) {
   protocol::Trace trace;
   const auto times = times_of(0, 100'000, 500, trace);
   EXPECT_EQ(trace.every(), 256U);
@@ -155,7 +155,7 @@ TEST(TraceSolverTest, ASecondOrderIsDeclinedWhileOneIsSolved) {
   EXPECT_EQ(answer_of(solver).trace_id(), 7U);
 }
 
-TEST(TraceSolverTest, ACancelledOrderIsDeclinedAndADroppedOneNotAnswered) {
+TEST(TraceSolverTest, ACancelledOrderIsDeclinedAndADroppedOrderIsNotAnswered) {
   Solving solving;
   solving.hold();
   TraceSolver solver(solving.solve(), [] {});

@@ -63,24 +63,24 @@ ScriptedServer::Answer has_study(const std::string& state) {
   };
 }
 
-test::Outcome ask(const ScriptedServer& server, std::vector<std::string> words) {
+test::Outcome run_client(const ScriptedServer& server, std::vector<std::string> words) {
   words.insert(words.end(), {"--server", server.url()});
   return test::run_oblique(words);
 }
 
-TEST(Answers, OfSeveralPartsAreJoined) {
+TEST(Answers, PartsOfOneAnswerAreJoined) {
   const ScriptedServer server(gives([](std::uint64_t id, std::uint64_t taken) {
     return std::vector{frame_of(id, chunk_of(taken + 1, {2}, taken == 3))};
   }));
   for (const auto& words : {std::vector<std::string>{"query", "s", "--format", "csv"},
                             std::vector<std::string>{"sql", "SELECT 1", "--format", "csv"}}) {
-    const auto all = ask(server, words);
+    const auto all = run_client(server, words);
     EXPECT_EQ(all.exit_code, 0) << all.err;
     EXPECT_EQ(all.out, "point\n0\n1\n2\n2\n2\n");
   }
 }
 
-TEST(Answers, ThatAreIncompleteEndWithOne) {
+TEST(Answers, AnIncompleteAnswerGivesExitCodeOne) {
   const auto error = [](std::uint64_t id, std::uint64_t) {
     protocol::ClientReply reply;
     reply.set_request_id(id);
@@ -102,36 +102,37 @@ TEST(Answers, ThatAreIncompleteEndWithOne) {
     return std::vector{frame_of(id, wider)};
   };
   const std::string broke_off = "the answer ended after 2 rows";
-  for (const auto& [answer, says] : {std::pair{gives(error), std::string("disk is \\x1b[2J gone")},
-                                     {gives(lacking), broke_off},
-                                     {gives(unsound), broke_off},
-                                     {gives(of_more_columns), broke_off}}) {
+  for (const auto& [answer, expected] :
+       {std::pair{gives(error), std::string("disk is \\x1b[2J gone")},
+        {gives(lacking), broke_off},
+        {gives(unsound), broke_off},
+        {gives(of_more_columns), broke_off}}) {
     const ScriptedServer server(answer);
-    const auto csv = ask(server, {"query", "s", "--format", "csv"});
+    const auto csv = run_client(server, {"query", "s", "--format", "csv"});
     EXPECT_EQ(csv.exit_code, 1);
-    EXPECT_THAT(csv.err, testing::HasSubstr(says));
+    EXPECT_THAT(csv.err, testing::HasSubstr(expected));
   }
 }
 
-TEST(Answers, ThatStopEndWithOne) {
+TEST(Answers, AnAnswerThatStopsArrivingGivesExitCodeOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
   do {  // repeats the query if the first chunk was too late
-    csv = ask(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
+    csv = run_client(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);
   EXPECT_THAT(csv.err, testing::HasSubstr("ended after 2 rows: nothing came from"));
 }
 
-TEST(Watch, EndsWithZeroForADoneStudyAndWithOneForACancelledOne) {
-  EXPECT_EQ(ask(ScriptedServer(has_study("done")), {"watch", "s"}).exit_code, 0);
-  const auto watch = ask(ScriptedServer(has_study("cancelled")), {"watch", "s"});
+TEST(Watch, ExitsWithZeroForADoneStudyAndWithOneForACancelledStudy) {
+  EXPECT_EQ(run_client(ScriptedServer(has_study("done")), {"watch", "s"}).exit_code, 0);
+  const auto watch = run_client(ScriptedServer(has_study("cancelled")), {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
   EXPECT_THAT(watch.err, testing::HasSubstr("The study is cancelled; `oblique resume` continues"));
 }
 
-TEST(Watch, ReportsFailedPointsWithReasonsAndEndsWithOne) {
+TEST(Watch, ReportsFailedPointsWithReasonsAndExitsWithOne) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     if (request.has_status()) {
@@ -153,38 +154,38 @@ TEST(Watch, ReportsFailedPointsWithReasonsAndEndsWithOne) {
     }
     return std::vector{protocol::encode(reply)};
   });
-  const auto watch = ask(server, {"watch", "s"});
+  const auto watch = run_client(server, {"watch", "s"});
   EXPECT_EQ(watch.exit_code, 1);
   EXPECT_NE(watch.err.find("3 of 10 points failed"), std::string::npos) << watch.err;
   EXPECT_NE(watch.err.find("3 x no \\x1b[2J answer (first at point 4)"), std::string::npos)
       << watch.err;
 }
 
-constexpr const char* kSteering = "\x1b[2J\u009b2J\u202e\x7f";
+constexpr const char* kControlCodes = "\x1b[2J\u009b2J\u202e\x7f";
 
 /// Fills every text of a reply with control sequences.
-std::vector<std::string> steering(const protocol::ClientRequest& request) {
+std::vector<std::string> reply_of_control_codes(const protocol::ClientRequest& request) {
   auto reply = reply_to(request);
   if (request.has_status() && request.status().study() == "error") {
-    reply.mutable_error()->set_message(kSteering);
+    reply.mutable_error()->set_message(kControlCodes);
   } else if (request.has_status()) {
     auto& study = *reply.mutable_status()->add_studies();
-    study.set_name(kSteering);
-    study.set_state(kSteering);
+    study.set_name(kControlCodes);
+    study.set_state(kControlCodes);
     study.set_points(10);
-    study.set_created_at(kSteering);
-    study.set_waits_for(kSteering);
+    study.set_created_at(kControlCodes);
+    study.set_waits_for(kControlCodes);
   } else if (request.has_workers()) {
     auto& worker = *reply.mutable_workers()->add_workers();
-    worker.set_name(kSteering);
-    worker.set_instruction_set(kSteering);
-    worker.set_solver_version(kSteering);
+    worker.set_name(kControlCodes);
+    worker.set_instruction_set(kControlCodes);
+    worker.set_solver_version(kControlCodes);
   } else if (request.has_change()) {
-    reply.mutable_change()->mutable_study()->set_name(kSteering);
-    reply.mutable_change()->mutable_study()->set_state(kSteering);
+    reply.mutable_change()->mutable_study()->set_name(kControlCodes);
+    reply.mutable_change()->mutable_study()->set_state(kControlCodes);
   } else if (request.has_query()) {
-    protocol::ChunkWriter rows({kSteering});
-    rows.text(kSteering);
+    protocol::ChunkWriter rows({kControlCodes});
+    rows.text(kControlCodes);
     rows.end_row();
     *reply.mutable_query() = rows.take();
     reply.mutable_query()->set_chunk(1);
@@ -193,8 +194,8 @@ std::vector<std::string> steering(const protocol::ClientRequest& request) {
   return {protocol::encode(reply)};
 }
 
-TEST(TextsOfAServer, CannotControlTheTerminal) {
-  const ScriptedServer server(steering);
+TEST(ServerText, CannotSendControlCodesToTheTerminal) {
+  const ScriptedServer server(reply_of_control_codes);
   const std::vector<std::vector<std::string>> all{{"status"},
                                                   {"status", "--format", "json"},
                                                   {"status", "error"},
@@ -209,14 +210,14 @@ TEST(TextsOfAServer, CannotControlTheTerminal) {
                                                   {"sql", "SELECT 1"},
                                                   {"sql", "SELECT 1", "--format", "json"}};
   for (const auto& words : all) {
-    const auto outcome = ask(server, words);
-    const auto said = outcome.out + outcome.err;
-    const auto line = testing::PrintToString(words) + said;
-    EXPECT_TRUE(said.find("\\x1b[2J") != std::string::npos ||
-                said.find("\\u001b[2J") != std::string::npos)
+    const auto outcome = run_client(server, words);
+    const auto output = outcome.out + outcome.err;
+    const auto line = testing::PrintToString(words) + output;
+    EXPECT_TRUE(output.find("\\x1b[2J") != std::string::npos ||
+                output.find("\\u001b[2J") != std::string::npos)
         << line;
     for (const char* raw : {"\x1b", "\u009b", "\u202e", "\x7f"}) {
-      EXPECT_EQ(said.find(raw), std::string::npos) << line;
+      EXPECT_EQ(output.find(raw), std::string::npos) << line;
     }
   }
 }

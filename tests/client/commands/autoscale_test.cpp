@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(JobsToSubmit, AreOnePerShareOfOpenPointsWithinLimitsMinusExistingJobs) {
+TEST(JobsToSubmit, AreOnePerHundredOpenPointsWithinLimitsMinusExistingJobs) {
   const struct {
     std::uint64_t open;
     std::size_t jobs;
@@ -48,7 +48,7 @@ TEST(JobsToSubmit, AreOnePerShareOfOpenPointsWithinLimitsMinusExistingJobs) {
   }
 }
 
-TEST(OpenPoints, AreThoseOfRunningStudiesThatWorkersWouldHelp) {
+TEST(OpenPoints, IncludeOnlyRunningStudiesThatMoreWorkersCanHelp) {
   const struct {
     const char* state;
     std::uint64_t points;
@@ -86,14 +86,14 @@ class Autoscale : public testing::Test {
  protected:
   Autoscale() {
     std::ofstream(folder_.file("jobs")) << "#!/bin/sh\n";
-    pretend("sbatch", "echo \"$@\" >> sbatch.log; echo '4711;cluster'");
+    install_fake("sbatch", "echo \"$@\" >> sbatch.log; echo '4711;cluster'");
     const auto submitted =
         test::run_oblique(folder_, {"submit", "--server", server_.client_url(), "--H", "1", "--mu",
                                     "0.1:2:5", "--e", "0.5:1:5", "--name", "study"});
     EXPECT_EQ(submitted.exit_code, 0) << submitted.err;
   }
 
-  void pretend(const std::string& program, const std::string& script) const {
+  void install_fake(const std::string& program, const std::string& script) const {
     std::ofstream(folder_.file(program)) << "#!/bin/sh\n" << script << '\n';
     chmod(folder_.file(program).c_str(), 0700);
   }
@@ -118,9 +118,9 @@ class Autoscale : public testing::Test {
 };
 
 TEST_F(Autoscale, SubmitsTheScriptForMissingJobs) {
-  pretend("squeue",
-          "echo \"$@\" > squeue.log\n"
-          "printf 'RUNNING\\nPENDING\\nCOMPLETING\\n%s' \"${SQUEUE_PARTITION+FILTERED}\"");
+  install_fake("squeue",
+               "echo \"$@\" > squeue.log\n"
+               "printf 'RUNNING\\nPENDING\\nCOMPLETING\\n%s' \"${SQUEUE_PARTITION+FILTERED}\"");
   const std::string name = "--job-name=oblique@" + server_.client_url().substr(6);
   const std::string command = "--partition=short -A lab7 --parsable " + name + " jobs\n";
   const std::vector<std::string> arguments{"--sbatch-args", "--partition=short  -A lab7"};
@@ -140,8 +140,8 @@ TEST_F(Autoscale, SubmitsTheScriptForMissingJobs) {
   EXPECT_EQ(once.exit_code, 0) << once.err;
   EXPECT_THAT(once.err, HasSubstr("submitted job 4711\n"));
   EXPECT_EQ(submissions(), command + command);
-  std::ifstream asked(folder_.file("squeue.log"));
-  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(asked), {}),
+  std::ifstream squeue_log(folder_.file("squeue.log"));
+  EXPECT_THAT(std::string(std::istreambuf_iterator<char>(squeue_log), {}),
               HasSubstr("--me --array --name=oblique@" + server_.client_url().substr(6)));
 }
 
@@ -152,26 +152,26 @@ TEST_F(Autoscale, FailsAtOnceIfSlurmFails) {
     return outcome.err;
   };
   EXPECT_THAT(error({{"PATH", "/nowhere"}}), HasSubstr("squeue is not in PATH"));
-  pretend("squeue", "echo RUNNING; echo 'no controller' >&2; exit 1");
+  install_fake("squeue", "echo RUNNING; echo 'no controller' >&2; exit 1");
   EXPECT_THAT(error(), HasSubstr("squeue ended with exit code 1: no controller"));
   EXPECT_EQ(submissions(), "");
-  pretend("squeue", "");
-  pretend("sbatch", "echo 'invalid partition' >&2; exit 1");
+  install_fake("squeue", "");
+  install_fake("sbatch", "echo 'invalid partition' >&2; exit 1");
   EXPECT_THAT(error(), HasSubstr("sbatch ended with exit code 1: invalid partition"));
 }
 
 TEST_F(Autoscale, ContinuesAfterAFailureOfSlurmAndEndsWithASignal) {
-  pretend("squeue", "[ ! -e away ] || exit 1; [ ! -e sbatch.log ] || cat jobs.now");
+  install_fake("squeue", "[ ! -e away ] || exit 1; [ ! -e sbatch.log ] || cat jobs.now");
   std::ofstream(folder_.file("jobs.now")) << "RUNNING\nRUNNING\nPENDING\n";
   const auto client = started({"--interval", "0.1"});
-  const auto wait_until_said = [&](const std::string& words) {
+  const auto wait_until_printed = [&](const std::string& words) {
     test::wait_until(words, [&] { return client->err().find(words) != std::string::npos; });
   };
-  wait_until_said("are pending or running: submitting 1 job\n");
+  wait_until_printed("are pending or running: submitting 1 job\n");
   std::ofstream(folder_.file("away")) << "";
-  wait_until_said("trying again every 0.1 s");
+  wait_until_printed("trying again every 0.1 s");
   std::filesystem::remove(folder_.file("away"));
-  wait_until_said("succeeded again");
+  wait_until_printed("succeeded again");
   client->send(SIGINT);
   EXPECT_EQ(client->wait(), 130);
   EXPECT_THAT(client->err(), HasSubstr("scancel --name oblique@"));
@@ -189,7 +189,7 @@ TEST(AutoscaleFlags, ThatCannotWorkAreWrongUsage) {
   };
   const struct {
     std::vector<std::string> arguments;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {{"slurm"}, "--max is required"},
       {{"pbs", "--max", "1"}, "it must be slurm"},
@@ -198,10 +198,10 @@ TEST(AutoscaleFlags, ThatCannotWorkAreWrongUsage) {
       {{"slurm", "--max", "2", "--script", "jobs", "--sbatch-args", "--array=1-3"}, "is one job"},
       {{"slurm", "--max", "2", "--script", "jobs"}, "OBLIQUE_WORKER_SERVER is not set"},
   };
-  for (const auto& [arguments, says] : wrong) {
+  for (const auto& [arguments, expected] : wrong) {
     const auto outcome = outcome_of(arguments, {});
-    EXPECT_EQ(outcome.exit_code, 2) << says << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+    EXPECT_EQ(outcome.exit_code, 2) << expected << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
   const auto warned =
       outcome_of({"slurm", "--max", "2", "--script", "jobs", "--once", "--keys", "keys/reader.key"},

@@ -39,7 +39,7 @@ std::set<std::string> members_of(const nlohmann::ordered_json& json) {
 }
 
 // Results of one point: the output of `solve --json`, and all columns that `run` stored.
-class TwoWays : public testing::Test {
+class OneResult : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     const test::TemporaryFolder folder;
@@ -61,7 +61,7 @@ class TwoWays : public testing::Test {
   static inline nlohmann::ordered_json row;
 };
 
-TEST_F(TwoWays, EveryColumnOfQueriesIsDescribedAndNoOther) {
+TEST_F(OneResult, DescriptionsCoverExactlyTheColumnsOfQueries) {
   std::set<std::string> names;
   for (const auto& [name, value] : row.items()) {
     names.insert(name);
@@ -69,7 +69,7 @@ TEST_F(TwoWays, EveryColumnOfQueriesIsDescribedAndNoOther) {
   EXPECT_EQ(described_columns(), names);
 }
 
-TEST_F(TwoWays, EveryMemberOfSolveJsonIsDescribedAndNoOther) {
+TEST_F(OneResult, DescriptionsCoverExactlyTheMembersOfSolveJson) {
   std::set<std::string> names;
   for (const auto& column : server::all_columns()) {
     if (!column.solve_json.empty()) {
@@ -96,7 +96,7 @@ void expect_same(const nlohmann::ordered_json& stored, const nlohmann::ordered_j
   }
 }
 
-TEST_F(TwoWays, ColumnsAndMembersOfOneNameAgreeInTheStoredDigits) {
+TEST_F(OneResult, QueriesAndSolveJsonGiveTheSameValuesInAllStoredDigits) {
   for (const auto& column : server::all_columns()) {
     if (column.solve_json.empty() || column.name == "wall_s") {
       continue;
@@ -110,7 +110,7 @@ TEST_F(TwoWays, ColumnsAndMembersOfOneNameAgreeInTheStoredDigits) {
   }
 }
 
-TEST(Columns, OfShortTimesAreShownInTheUnitsOfTheReport) {
+TEST(Columns, ShowShortTimesInTheSameUnitsAsTheReport) {
   protocol::Table rows{.columns = {"duration_s", "slide_m", "wall_s", "H", "max(duration_s)"}};
   auto& row = rows.rows.emplace_back();
   for (const double value : {0.000543704, 0.00114159, 0.001, 1.0, 0.000543704}) {

@@ -29,7 +29,7 @@ std::vector<std::string> words_of(const std::string& line) {
 TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
   const struct {
     const char* line;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {"", "no command given"},
       {"solv", "unknown command `solv` (did you mean `solve`?)"},
@@ -69,16 +69,16 @@ TEST(CommandLine, AnswersWrongUsageWithExitCodeTwoAndASentence) {
       {"solve --H 1 --mu 0.4 --e 1 --trace - --json", "both write to standard output"},
       {"solve --H 1 --mu 0.4 --e 1 --trace-shape", "--trace"},
   };
-  for (const auto& [words, says] : wrong) {
+  for (const auto& [words, expected] : wrong) {
     const auto outcome = test::run_oblique(words_of(words));
     EXPECT_EQ(outcome.exit_code, 2) << words << outcome.err;
     EXPECT_EQ(outcome.out, "") << words;
-    EXPECT_NE(outcome.err.find(says), std::string::npos) << words << outcome.err;
+    EXPECT_NE(outcome.err.find(expected), std::string::npos) << words << outcome.err;
     EXPECT_TRUE(outcome.err.starts_with("oblique")) << words << outcome.err;
   }
 }
 
-TEST(CommandLine, ConvergesWithTheModelOfThePointThatTheFilterKeeps) {
+TEST(CommandLine, ConvergeUsesTheModelOfThePointThatTheFilterKeeps) {
   const auto converged = [](const std::vector<std::string>& more) {
     std::vector<std::string> words{"converge", "--preset", "paper", "--H",   "0.9",
                                    "--mu",     "0.4",      "--e",   "1",     "--coarsest",
@@ -91,7 +91,7 @@ TEST(CommandLine, ConvergesWithTheModelOfThePointThatTheFilterKeeps) {
   EXPECT_EQ(converged({"--k", "1e7,2e7", "--where", "k > 1.5e7"}), converged({"--k", "2e7"}));
 }
 
-TEST(CommandLine, NotesTheErrorsOfACoarseMeshOnceOnStandardError) {
+TEST(CommandLine, WarnsOfTheErrorsOfACoarseMeshOnceOnStandardError) {
   const test::TemporaryFolder folder;
   const auto err_of = [&](std::vector<std::string> words) {
     words.insert(words.end(), {"--H", "0.6", "--mu", "0.4", "--e", "1"});
@@ -101,7 +101,8 @@ TEST(CommandLine, NotesTheErrorsOfACoarseMeshOnceOnStandardError) {
   EXPECT_THAT(err_of({"solve", "--preset", "paper", "--json"}), HasSubstr(note));
   EXPECT_THAT(err_of({"study", "check", "--preset", "paper", "--no-rate"}), HasSubstr(note));
   EXPECT_THAT(err_of({"run", "--preset", "paper"}), HasSubstr(note));
-  EXPECT_THAT(err_of({"run", "--preset", "paper"}), Not(HasSubstr(note))) << "it is there already";
+  EXPECT_THAT(err_of({"run", "--preset", "paper"}), Not(HasSubstr(note)))
+      << "an existing study gets no note";
   EXPECT_THAT(err_of({"plot", "--preset", "paper"}), Not(HasSubstr(note)));
   EXPECT_THAT(err_of({"solve"}), Not(HasSubstr("Note")));
   for (const auto& words :
@@ -119,7 +120,7 @@ TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
   std::ofstream(folder.path() / "pipe.toml") << "[[block]]\ncsv = 'pipe'\n";
   const struct {
     const char* line;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {"study check /dev/zero", "the study file /dev/zero cannot be read: it is a device"},
       {"study check pipe", "the study file pipe cannot be read: it is a pipe"},
@@ -132,10 +133,10 @@ TEST(CommandLine, RefusesIrregularFilesAndNamesTheirKind) {
       {"backup saved.db --db pipe --salvage", "pipe is a pipe"},
       {"autoscale slurm --max 1 --script pipe", "the script pipe cannot be read"},
   };
-  for (const auto& [line, says] : wrong) {
+  for (const auto& [line, expected] : wrong) {
     const auto outcome = test::run_oblique(folder, words_of(line));
     EXPECT_NE(outcome.exit_code, 0) << line;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
   const auto doctor = test::run_oblique(folder, {"doctor", "--db", "./pipe"});
   EXPECT_NE(doctor.out.find("/pipe is a pipe"), std::string::npos) << doctor.out;
@@ -159,21 +160,21 @@ TEST(CommandLine, RepeatsAtMostEightyCharactersOfAWrongKey) {
   }
 }
 
-TEST(CommandLine, MissingThingsFailWithOneAndTheRemedy) {
+TEST(CommandLine, AMissingServerOrFileIsNamedAndGivesExitCodeOne) {
   const struct {
     const char* line;
-    const char* says;
+    const char* expected;
   } missing[] = {
       {"status --server tcp://127.0.0.1:1 --timeout 0.05",
        "no answer from tcp://127.0.0.1:1 within 0.05 s"},
       {"studies --db nowhere.db", "nowhere.db"},
       {"view nowhere.db", "there is no file nowhere.db"},
   };
-  for (const auto& [line, says] : missing) {
+  for (const auto& [line, expected] : missing) {
     const auto outcome = test::run_oblique(words_of(line));
     EXPECT_EQ(outcome.exit_code, 1) << line;
     EXPECT_EQ(outcome.out, "") << line;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
 }
 
@@ -209,7 +210,7 @@ TEST(HelpText, WrapsSentences) {
             "one two\nthree four\nfive\n\nsix seven\neight\n");
 }
 
-TEST(HelpText, LeavesCommandsAndLongWordsWhole) {
+TEST(HelpText, DoesNotBreakCommandsOrLongWords) {
   const std::string help = "Examples:\n  oblique run a.toml   a study here\nabcdefghijklmnop\n";
   EXPECT_EQ(fitted_help(help, 12, 20), help);
 }

@@ -24,7 +24,7 @@ class DatabaseQuery : public testing::Test {
     server::Store store((folder_.path() / "oblique.db").string());
     test::add_study(store, "a", 4, 4);
   }
-  test::Outcome ask(const std::vector<std::string>& arguments) {
+  test::Outcome run_command(const std::vector<std::string>& arguments) {
     return test::run_oblique(folder_, arguments);
   }
 
@@ -32,22 +32,22 @@ class DatabaseQuery : public testing::Test {
 };
 
 TEST_F(DatabaseQuery, AStatementHasATimeLimit) {
-  const auto outcome =
-      ask({"sql",
-           "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n",
-           "--timeout", "0.2"});
+  const auto outcome = run_command(
+      {"sql",
+       "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT max(i) FROM n",
+       "--timeout", "0.2"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_EQ(outcome.out, "");
   EXPECT_THAT(outcome.err, HasSubstr("took more than 0.2 s"));
 }
 
 TEST_F(DatabaseQuery, AStatementHasAMemoryLimit) {
-  EXPECT_THAT(ask({"sql", "SELECT hex(zeroblob(450000000))"}).err,
+  EXPECT_THAT(run_command({"sql", "SELECT hex(zeroblob(450000000))"}).err,
               HasSubstr("exceeds the allowed 64 MiB"));
   const auto outcome =
-      ask({"sql",
-           "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000) "
-           "SELECT b FROM (SELECT hex(zeroblob(500000)) || i AS b FROM n) ORDER BY b"});
+      run_command({"sql",
+                   "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 5000) "
+                   "SELECT b FROM (SELECT hex(zeroblob(500000)) || i AS b FROM n) ORDER BY b"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("more memory than the 1024 MiB allowed"));
 }
@@ -55,7 +55,7 @@ TEST_F(DatabaseQuery, AStatementHasAMemoryLimit) {
 TEST_F(DatabaseQuery, AWrongStatementIsWrongUsage) {
   const struct {
     std::vector<std::string> words;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {{"query", "a", "--where", "E > 1e10"}, "write e, or E_Pa"},
       {{"query", "a", "--where", "fn_peak > 1"}, "did you mean `fn_peak_N`"},
@@ -63,31 +63,34 @@ TEST_F(DatabaseQuery, AWrongStatementIsWrongUsage) {
       {{"sql", "DELETE FROM runs"}, "only reading is allowed"},
       {{"sql", "SELECT * FROM runs WHERE mu > @mu"}, "parameter"},
   };
-  for (const auto& [words, says] : wrong) {
-    const auto outcome = ask(words);
-    EXPECT_EQ(outcome.exit_code, 2) << says;
-    EXPECT_EQ(outcome.out, "") << says;
-    EXPECT_THAT(outcome.err, HasSubstr(says));
+  for (const auto& [words, expected] : wrong) {
+    const auto outcome = run_command(words);
+    EXPECT_EQ(outcome.exit_code, 2) << expected;
+    EXPECT_EQ(outcome.out, "") << expected;
+    EXPECT_THAT(outcome.err, HasSubstr(expected));
   }
 }
 
 TEST_F(DatabaseQuery, AModeThatNoPointHasIsReported) {
-  const auto unknown = ask({"query", "a", "--where", "mu < 2 AND major_mode = 'SC SR SR'"});
+  const auto unknown = run_command({"query", "a", "--where", "mu < 2 AND major_mode = 'SC SR SR'"});
   EXPECT_EQ(unknown.exit_code, 0) << unknown.err;
   EXPECT_THAT(unknown.err, testing::AllOf(HasSubstr("no point of a meets the condition"),
                                           HasSubstr("'SC SR sR sC sR'")));
-  const auto known = ask({"sql", "SELECT mode FROM runs LIMIT 1", "--format", "csv"}).out;
+  const auto known = run_command({"sql", "SELECT mode FROM runs LIMIT 1", "--format", "csv"}).out;
   const auto mode = known.substr(5, known.find('\n', 5) - 5);
-  EXPECT_EQ(ask({"query", "a", "--where", "mode == '" + mode + "'", "--format", "csv"}).err, "");
+  EXPECT_EQ(run_command({"query", "a", "--where", "mode == '" + mode + "'", "--format", "csv"}).err,
+            "");
 }
 
-TEST_F(DatabaseQuery, AFileHasTheFormatOfItsEnding) {
-  EXPECT_EQ(ask({"query", "a", "--select", "point", "--limit", "1", "--out", "x.csv"}).exit_code,
-            0);
+TEST_F(DatabaseQuery, TheFormatOfAnOutputFileFollowsFromItsExtension) {
+  EXPECT_EQ(
+      run_command({"query", "a", "--select", "point", "--limit", "1", "--out", "x.csv"}).exit_code,
+      0);
   std::ifstream file(folder_.path() / "x.csv");
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(file), {}), "point\n0\n");
-  EXPECT_THAT(ask({"sql", "SELECT 1", "--out", "x.txt"}).err, HasSubstr("end the name in .csv"));
-  EXPECT_THAT(ask({"query", "a", "--select", "point", "--out", "/dev/stdout"}).out,
+  EXPECT_THAT(run_command({"sql", "SELECT 1", "--out", "x.txt"}).err,
+              HasSubstr("end the name in .csv"));
+  EXPECT_THAT(run_command({"query", "a", "--select", "point", "--out", "/dev/stdout"}).out,
               testing::StartsWith("point\n"));
 }
 

@@ -52,13 +52,13 @@ class Doctor : public testing::Test {
 
 TEST_F(Doctor, ReportsEachCheckOnOneLine) {
   const auto out = healthy({});
-  for (const char* says : {"versions   oblique ", "oblique-server is of the same build\n",
+  for (const char* line : {"versions   oblique ", "oblique-server is of the same build\n",
                            "oblique-worker is of the same build\n", "processor  ",
                            "threads may be used; the solver uses ", "solver     ",
                            "ms of processor time per point; reference for ", "disk       ",
                            "there is no database oblique.db yet", "key        no key file",
                            "server     not checked"}) {
-    EXPECT_THAT(out, HasSubstr(says));
+    EXPECT_THAT(out, HasSubstr(line));
   }
   std::istringstream lines(out);
   for (std::string line; std::getline(lines, line);) {

@@ -51,12 +51,12 @@ test::Outcome parse(const Words& words) {
   return outcome;
 }
 
-void expect_wrong_usage(const Words& words, const std::string& says) {
+void expect_wrong_usage(const Words& words, const std::string& expected) {
   const auto outcome = parse(words);
   const std::string typed = PrintToString(words);
   EXPECT_EQ(outcome.exit_code, 2) << typed << outcome.err;
   EXPECT_EQ(outcome.out, "") << typed;
-  EXPECT_THAT(outcome.err, AllOf(StartsWith("oblique"), HasSubstr(says))) << typed;
+  EXPECT_THAT(outcome.err, AllOf(StartsWith("oblique"), HasSubstr(expected))) << typed;
 }
 
 /// A command, such as `study`, or a subcommand, such as `study check`.
@@ -154,7 +154,7 @@ TEST(EveryCommand, HasAtLeastTwoExamplesInItsHelp) {
   }
 }
 
-TEST(EveryCommand, CanBeQuietOrVerboseAndNotBoth) {
+TEST(EveryCommand, AcceptsQuietOrVerboseButNotBoth) {
   for (const auto& command : every_command()) {
     EXPECT_THAT(command.help, HasSubstr("\n  --quiet")) << PrintToString(command.words);
     EXPECT_THAT(command.help, HasSubstr("\n  --verbose")) << PrintToString(command.words);
@@ -165,7 +165,7 @@ TEST(EveryCommand, CanBeQuietOrVerboseAndNotBoth) {
   }
 }
 
-TEST(EveryCommand, NamesTheNearestOfUnknownWordsAndMissingArguments) {
+TEST(EveryCommand, SuggestsTheNearestWordAndNamesMissingArguments) {
   for (const auto& command : every_command()) {
     expect_wrong_usage(with(command.words, {"--hlep"}), "(did you mean `--help`?)");
     Words words = command.words;
@@ -251,7 +251,7 @@ TEST(Flags, WithNumbersRefuseInvalidNumbers) {
   }
 }
 
-TEST(Flags, ShowErrorsThatCannotControlTheTerminal) {
+TEST(Flags, EscapeControlCodesInErrorMessages) {
   for (const Words& words : {Words{"so\x1blve"},
                              {"run", "--name", "a\u202eb", "--H", "1", "--mu", "1", "--e", "1"},
                              {"solve", "--H", "\x1b[2J"},
@@ -278,7 +278,7 @@ class EveryCommandThatReads : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingOneAndFailsWithOne) {
+TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingStudyAndExitsWithOne) {
   int commands = 0;
   for (const auto& command : every_command()) {
     const bool has_study = std::regex_search(usage_of(command), std::regex(" \\[?STUDY\\]?( |$)"));
@@ -304,7 +304,7 @@ TEST_F(EveryCommandThatReads, SuggestsTheNearestStudyForAMissingOneAndFailsWithO
   EXPECT_GE(commands, 4);
 }
 
-TEST_F(EveryCommandThatReads, PrintsOnlyDataWhenQuietAndPlacesAndTimesWhenVerbose) {
+TEST_F(EveryCommandThatReads, PrintsOnlyDataWhenQuietAndSourceAndTimesWhenVerbose) {
   const auto query = [this](const std::string& study, const Words& more) {
     return test::run_oblique(folder_, with({"query", study, "--format", "csv"}, more));
   };
@@ -330,7 +330,7 @@ TEST_F(EveryCommandThatReads, WithoutFileAndServerNamesBothFlags) {
                                HasSubstr("--db FILE"), HasSubstr("--server URL")));
 }
 
-TEST_F(EveryCommandThatReads, StatusHasRoomInEightyColumns) {
+TEST_F(EveryCommandThatReads, StatusFitsInEightyColumns) {
   const auto status = test::run_oblique(folder_, {"status"});
   EXPECT_EQ(status.exit_code, 0);
   const auto line = status.out.substr(0, status.out.find('\n'));

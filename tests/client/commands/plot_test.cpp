@@ -52,7 +52,7 @@ class Plot : public testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST_F(Plot, WritesTheFormatOfTheEndingAndNeedsAFileInAPipe) {
+TEST_F(Plot, WritesTheFormatOfTheExtensionAndNeedsAFileIfOutputIsAPipe) {
   const auto unasked = plot({"a"});
   EXPECT_EQ(unasked.exit_code, 0) << unasked.err;
   EXPECT_THAT(unasked.out, AllOf(StartsWith("<?xml"), HasSubstr("a: fn"), HasSubstr("</svg>")));
@@ -66,14 +66,15 @@ TEST_F(Plot, WritesTheFormatOfTheEndingAndNeedsAFileInAPipe) {
   const std::string png = file("a.png");
   EXPECT_THAT(png, StartsWith("\x89PNG"));
   ASSERT_GT(png.size(), 24U);
-  EXPECT_EQ(png.substr(16, 4), std::string("\x00\x00\x03\x20", 4)) << "two pixels for one";
+  EXPECT_EQ(png.substr(16, 4), std::string("\x00\x00\x03\x20", 4))
+      << "a PNG has two pixels per unit of size";
   const auto pipe = test::run_oblique(folder_, {"plot", "a"});
   EXPECT_EQ(pipe.exit_code, 2);
   EXPECT_EQ(pipe.out, "");
   EXPECT_THAT(pipe.err, HasSubstr("--out FILE.svg"));
 }
 
-TEST_F(Plot, WithoutGnuplotNamesItsPackageAndTheScriptThatNeedsNone) {
+TEST_F(Plot, WithoutGnuplotNamesItsPackageAndTheFormatThatDoesNotNeedIt) {
   const auto without_gnuplot = [this](const std::string& out) {
     return test::Process(folder_, test::client_program(), {"plot", "a", "--out", out},
                          {{"PATH", "/nowhere"}})
@@ -103,7 +104,7 @@ TEST_F(Plot, ShowsAsciiInAPipe) {
   EXPECT_THAT(outcome.out, Not(HasSubstr("<svg")));
 }
 
-TEST_F(Plot, WithoutValuesReportsItOnStandardError) {
+TEST_F(Plot, ReportsMissingValuesOnStandardError) {
   const auto outcome =
       plot({"a", "--scatter", "mu,fn_peak_N", "--colour", "duration_s", "--where", "mu > 5"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -112,10 +113,10 @@ TEST_F(Plot, WithoutValuesReportsItOnStandardError) {
   EXPECT_THAT(plot({"a", "--histogram", "fn_peak_N"}).err, Not(HasSubstr("No point")));
 }
 
-TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
+TEST_F(Plot, AWrongFlagIsNamedWithTheAllowedValues) {
   struct Wrong {
     std::vector<std::string> arguments;
-    std::string says;
+    std::string expected;
     int exit_code = 2;
   };
   for (const Wrong& wrong :
@@ -142,9 +143,9 @@ TEST_F(Plot, OfAWrongFlagNamesItAndWhatIsAllowed) {
                           {{"--H", "0.5,1", "--mu", "1", "--e", "1"}, "one value per flag"},
                           {{"a", "--point", "12"}, "0 to 11", 1}}) {
     const auto outcome = plot(wrong.arguments);
-    EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.says << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(wrong.says));
-    EXPECT_EQ(outcome.out, "") << wrong.says;
+    EXPECT_EQ(outcome.exit_code, wrong.exit_code) << wrong.expected << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(wrong.expected));
+    EXPECT_EQ(outcome.out, "") << wrong.expected;
   }
 }
 
@@ -154,7 +155,8 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
   EXPECT_THAT(other.out, AllOf(HasSubstr("Point 0 of a"), HasSubstr("Shape of the finger")));
   EXPECT_THAT(other.err, HasSubstr("The point was solved again: differs from the stored row in "));
   EXPECT_THAT(other.err, HasSubstr("fn_peak_N"));
-  EXPECT_THAT(other.out, HasSubstr("differs from the stored row in")) << "in the picture too";
+  EXPECT_THAT(other.out, HasSubstr("differs from the stored row in"))
+      << "the plot shows the difference as well";
   const auto not_stored = plot({"a", "--point", "11"});
   EXPECT_EQ(not_stored.exit_code, 0) << not_stored.err;
   EXPECT_THAT(not_stored.err, Not(HasSubstr("stored")));
@@ -166,23 +168,24 @@ TEST_F(Plot, DrawsAPointSolvedAgainAndReportsDifferencesFromTheStoredRow) {
   EXPECT_THAT(same.err + same.out, Not(HasSubstr("stored")));
 }
 
-TEST_F(Plot, OfAServerHasTheShapesFromAWorker) {
+TEST_F(Plot, ShowsTheShapesThatAWorkerOfTheServerSolved) {
   const test::Server server(folder_, "oblique.db");
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
-  const auto ask = [&](const std::string& more) {
+  const auto plot_shape = [&](const std::string& more) {
     return plot({"a", "--point", "11", "--panel", "shape", "--server", server.client_url(), more});
   };
-  test::wait_until("the worker is there", [&] { return ask("--on-worker").exit_code == 0; });
-  const auto there = ask("--on-worker");
+  test::wait_until("the server has a worker",
+                   [&] { return plot_shape("--on-worker").exit_code == 0; });
+  const auto there = plot_shape("--on-worker");
   EXPECT_THAT(there.out, HasSubstr("at touch"));
   EXPECT_THAT(there.out, HasSubstr("at separation"));
   EXPECT_THAT(there.out, HasSubstr("drop "));
   EXPECT_THAT(there.out, Not(HasSubstr("--local")));
-  const auto here = ask("--local");
+  const auto here = plot_shape("--local");
   EXPECT_EQ(here.out, there.out);
 }
 
-TEST_F(Plot, DrawsPanelsOfAPointOfNoStudy) {
+TEST_F(Plot, DrawsPanelsOfAPointThatBelongsToNoStudy) {
   const auto panel = [this](const std::string& name) {
     const auto outcome = plot({"--preset", "paper", "--H", "0.4", "--mu", "1.2", "--e", "1",
                                "--tip-mass", "0.001", "--panel", name});
@@ -192,12 +195,12 @@ TEST_F(Plot, DrawsPanelsOfAPointOfNoStudy) {
   EXPECT_THAT(panel("forces"),
               AllOf(HasSubstr("Contact forces"), Not(HasSubstr("Shape of the finger"))));
   EXPECT_THAT(panel("shape"), AllOf(HasSubstr("0.1 m"), HasSubstr("0.2 m"), HasSubstr("0.3 m")))
-      << "the finger as it falls";
+      << "shapes during the fall are missing";
   EXPECT_THAT(plot({"a", "--point", "0", "--panel", "loop", "--show"}).out,
               HasSubstr("compression"));
 }
 
-TEST(PaperFigures, AreFiveFilesInOneFolder) {
+TEST(PaperFigures, AreWrittenAsFiveFilesInOneFolder) {
   const test::TemporaryFolder folder;
   const auto outcome = test::run_oblique(folder, {"paper", "--figures", "made/here"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -59,7 +59,7 @@ TEST(Readme, ShowsTheTablesThatCommandsPrint) {
   }
 }
 
-TEST(Readme, HasTheNumbersOfTheComparison) {
+TEST(Readme, QuotesTheNumbersOfTheComparisonWithThePaper) {
   const auto printed = test::run_oblique({"paper"});
   std::smatch number;
   ASSERT_TRUE(std::regex_search(

@@ -16,7 +16,7 @@
 #include "client/study/study_file.h"
 #include "server/query/reader.h"
 #include "server/store/store.h"
-#include "tests/client/study/pretended_fall.h"
+#include "tests/client/study/fake_reach.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
 
@@ -58,7 +58,7 @@ void wait_until_at_work(const test::TemporaryFolder& folder, const test::Process
 
 void expect_gone(const std::vector<pid_t>& processes) {
   for (const pid_t pid : processes) {
-    EXPECT_EQ(kill(pid, 0), -1) << pid << " is still there";
+    EXPECT_EQ(kill(pid, 0), -1) << pid << " is still running";
   }
 }
 
@@ -120,7 +120,7 @@ TEST(Run, EstimatesErrorsOfAllPointsOrNone) {
   EXPECT_THAT(refused.err, HasSubstr("errors: stored true, given false"));
 }
 
-TEST(Run, OfAStudyPausedElsewhereNamesTheRemedyAndEndsWithOne) {
+TEST(Run, IfAnotherClientPausesTheStudyNamesTheRemedyAndExitsWithOne) {
   const test::TemporaryFolder folder;
   write_study(folder, 10'000'000);
   auto arguments = run_arguments();
@@ -128,20 +128,21 @@ TEST(Run, OfAStudyPausedElsewhereNamesTheRemedyAndEndsWithOne) {
   test::Process program(folder, test::client_program(), arguments);
   wait_until_at_work(folder, program);
   // The log contains the server's address for clients and the folder of the keys.
-  const auto said = program.err();
-  const auto word_after = [&said](const std::string& words) {
-    const auto rest = said.substr(said.find(words) + words.size());
+  const auto output = program.err();
+  const auto word_after = [&output](const std::string& words) {
+    const auto rest = output.substr(output.find(words) + words.size());
     return rest.substr(0, rest.find_first_of(",;\n"));
   };
   const std::filesystem::path keys = word_after("admits the 3 keys of ");
   const std::vector<std::string> pause{"pause", "many", "--server", word_after("clients at ")};
-  EXPECT_EQ(test::run_oblique(folder, pause).exit_code, 1) << "others on this machine have no key";
+  EXPECT_EQ(test::run_oblique(folder, pause).exit_code, 1) << "a client without a key was accepted";
   auto with_key = pause;
   with_key.insert(with_key.end(), {"--keys", (keys.parent_path() / "client.key").string()});
   const auto paused = test::run_oblique(folder, with_key);
   EXPECT_EQ(paused.exit_code, 0) << paused.err;
   const auto outcome = program.outcome();
-  EXPECT_FALSE(std::filesystem::exists(keys.parent_path())) << "the keys go with the run";
+  EXPECT_FALSE(std::filesystem::exists(keys.parent_path()))
+      << "the keys were not deleted at the end of the run";
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(outcome.out, "");
   EXPECT_THAT(
@@ -167,7 +168,7 @@ TEST(Run, SolvesOnlyItsStudyAndDoesNotChangeOthers) {
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_EQ(solved(folder), before);
   EXPECT_NE(test::run_oblique(folder, {"status", "many"}).out.find("running"), std::string::npos)
-      << "nothing is paused in the database";
+      << "an interrupted run leaves its study running in the database";
 }
 
 TEST(Run, ContinuesWithRemainingWorkersAndEndsWithoutWorkersOrServer) {
@@ -208,11 +209,11 @@ mu = [0.2, 0.4, 0.6]
 e = 0.8
 )";
 
-TEST(Run, OfAStudyOfAnotherSolverEndsWithTheRemedies) {
+TEST(Run, IfTheStudyHasResultsOfAnotherSolverNamesTheRemedies) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "begun.toml") << kBegun;
   {
-    const Study study = parse_study(kBegun, "begun.toml", pretended_reach());
+    const Study study = parse_study(kBegun, "begun.toml", fake_reach());
     const auto table = std::make_shared<const protocol::PointTable>(study.recipe);
     constexpr const char* kThen = "2024-01-01T00:00:00.000Z";
     server::Store((folder.path() / "oblique.db").string())
@@ -228,7 +229,7 @@ TEST(Run, OfAStudyOfAnotherSolverEndsWithTheRemedies) {
   EXPECT_THAT(outcome.err, HasSubstr("its other 2 points"));
   EXPECT_THAT(outcome.err, HasSubstr("--name begun-"));
   EXPECT_THAT(test::run_oblique(folder, {"status"}).out, HasSubstr("0.1\n"))
-      << "a file says it as a server does";
+      << "`status` shows the solver version of the results";
 }
 
 }  // namespace

@@ -28,12 +28,12 @@ std::string study_text(int blocks) {
 
 class StudyChanges : public testing::Test {
  protected:
-  test::Outcome ask(const std::vector<std::string>& words) {
+  test::Outcome run_command(const std::vector<std::string>& words) {
     return test::run_oblique(folder_, words);
   }
   test::Outcome run_study(int blocks) {
     std::ofstream(folder_.file("friction.toml")) << study_text(blocks);
-    return ask({"run", "friction.toml"});
+    return run_command({"run", "friction.toml"});
   }
 
   test::TemporaryFolder folder_;
@@ -43,7 +43,7 @@ TEST_F(StudyChanges, AStudyWithMoreBlocksSolvesOnlyTheNewPoints) {
   ASSERT_EQ(run_study(1).exit_code, 0);
   const auto grown = run_study(2);
   EXPECT_EQ(grown.exit_code, 0) << grown.err;
-  EXPECT_EQ(ask({"query", "friction", "--select", "point,mu", "--format", "csv"}).out,
+  EXPECT_EQ(run_command({"query", "friction", "--select", "point,mu", "--format", "csv"}).out,
             "point,mu\n0,0.1\n1,0.2\n2,0.3\n3,0.4\n");
   const auto shorter = run_study(1);
   EXPECT_EQ(shorter.exit_code, 1);
@@ -52,8 +52,8 @@ TEST_F(StudyChanges, AStudyWithMoreBlocksSolvesOnlyTheNewPoints) {
 
 TEST_F(StudyChanges, ADifferentStudyOfTheSameNameIsRefusedWithTheDifferences) {
   ASSERT_EQ(run_study(1).exit_code, 0);
-  const auto other = ask({"run", "--H", "1", "--mu", "0.1,0.3", "--e", "1", "--preset", "printed",
-                          "--name", "friction"});
+  const auto other = run_command({"run", "--H", "1", "--mu", "0.1,0.3", "--e", "1", "--preset",
+                                  "printed", "--name", "friction"});
   EXPECT_EQ(other.exit_code, 1);
   EXPECT_THAT(other.err, HasSubstr("\nmodel, "));
   EXPECT_THAT(other.err, HasSubstr("\nblock 1 differs\n"));
@@ -61,39 +61,42 @@ TEST_F(StudyChanges, ADifferentStudyOfTheSameNameIsRefusedWithTheDifferences) {
 
 TEST_F(StudyChanges, AStudyIsRenamed) {
   ASSERT_EQ(run_study(1).exit_code, 0);
-  EXPECT_EQ(ask({"rename", "friction", "slip"}).out, "friction is now called slip\n");
-  EXPECT_EQ(ask({"query", "slip", "--select", "point", "--format", "csv"}).out, "point\n0\n1\n");
-  const auto unknown = ask({"rename", "slop", "other"});
+  EXPECT_EQ(run_command({"rename", "friction", "slip"}).out, "friction is now called slip\n");
+  EXPECT_EQ(run_command({"query", "slip", "--select", "point", "--format", "csv"}).out,
+            "point\n0\n1\n");
+  const auto unknown = run_command({"rename", "slop", "other"});
   EXPECT_EQ(unknown.exit_code, 1);
   EXPECT_THAT(unknown.err, HasSubstr("did you mean `slip`?"));
-  EXPECT_EQ(ask({"rename", "slip", std::string(500, 'x')}).exit_code, 2);
+  EXPECT_EQ(run_command({"rename", "slip", std::string(500, 'x')}).exit_code, 2);
 }
 
 TEST_F(StudyChanges, AStudyIsDescribedAsAFileThatDefinesIt) {
   ASSERT_EQ(run_study(2).exit_code, 0);
-  const auto described = ask({"describe", "friction"});
+  const auto described = run_command({"describe", "friction"});
   EXPECT_EQ(described.exit_code, 0) << described.err;
   std::ofstream(folder_.file("again.toml")) << described.out;
-  const auto again = ask({"run", "again.toml"});
-  EXPECT_EQ(again.exit_code, 0) << "the same study, which is done: " << again.err;
-  EXPECT_EQ(ask({"describe", "frictoin"}).exit_code, 1);
+  const auto again = run_command({"run", "again.toml"});
+  EXPECT_EQ(again.exit_code, 0) << "the described study is the same study and is done: "
+                                << again.err;
+  EXPECT_EQ(run_command({"describe", "frictoin"}).exit_code, 1);
 }
 
 TEST_F(StudyChanges, AStudyIsDeletedAfterConfirmation) {
   ASSERT_EQ(run_study(1).exit_code, 0);
-  const auto asked = ask({"delete", "friction"});
-  EXPECT_EQ(asked.exit_code, 2) << "nobody is there to be asked";
-  EXPECT_THAT(asked.err, HasSubstr("--yes"));
-  EXPECT_EQ(ask({"delete", "friction", "--yes"}).out, "friction is deleted: 2 points, 2 results\n");
-  EXPECT_THAT(ask({"studies"}).out, Not(HasSubstr("friction")));
-  EXPECT_EQ(ask({"check"}).exit_code, 0);
-  EXPECT_EQ(ask({"delete", "friction", "--yes"}).exit_code, 1);
+  const auto unconfirmed = run_command({"delete", "friction"});
+  EXPECT_EQ(unconfirmed.exit_code, 2) << "without a terminal a deletion needs --yes";
+  EXPECT_THAT(unconfirmed.err, HasSubstr("--yes"));
+  EXPECT_EQ(run_command({"delete", "friction", "--yes"}).out,
+            "friction is deleted: 2 points, 2 results\n");
+  EXPECT_THAT(run_command({"studies"}).out, Not(HasSubstr("friction")));
+  EXPECT_EQ(run_command({"check"}).exit_code, 0);
+  EXPECT_EQ(run_command({"delete", "friction", "--yes"}).exit_code, 1);
   EXPECT_EQ(run_study(2).exit_code, 0) << "the name is free";
 }
 
-TEST_F(StudyChanges, OfAMissingStudyFailAndNameIt) {
+TEST_F(StudyChanges, AChangeOfAMissingStudyFailsAndNamesTheStudy) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
-    EXPECT_TRUE(request.has_status()) << "nothing is changed";
+    EXPECT_TRUE(request.has_status()) << "the client sent a request other than `status`";
     auto reply = reply_to(request);
     reply.mutable_status();
     return std::vector{protocol::encode(reply)};
@@ -101,7 +104,7 @@ TEST_F(StudyChanges, OfAMissingStudyFailAndNameIt) {
   for (const auto& words : std::vector<std::vector<std::string>>{
            {"rename", "friction", "slip", "--server", server.url()},
            {"delete", "friction", "--yes", "--server", server.url()}}) {
-    const auto outcome = ask(words);
+    const auto outcome = run_command(words);
     EXPECT_EQ(outcome.exit_code, 1) << words[0];
     EXPECT_EQ(outcome.out, "") << words[0];
     EXPECT_THAT(outcome.err, HasSubstr("no study called \"friction\" in " + server.url()));

@@ -35,7 +35,7 @@ TEST(StudyCheck, PrintsPointsBlocksModelsFallsTimeAndSize) {
   EXPECT_EQ(block["points"], 615);
   EXPECT_EQ(block["last"]["point"], 1649);
   EXPECT_EQ(block["last"]["mu"], 2.0);
-  EXPECT_GT(block["first"]["mu"], 0.25) << "the first that is left in";
+  EXPECT_GT(block["first"]["mu"], 0.25) << "`first` is the first point that the filter keeps";
   EXPECT_GT(json["time_s"], 0.0);
   EXPECT_GT(json["solved_points"], 0);
   EXPECT_GT(json["bytes"], 0.0);
@@ -62,7 +62,7 @@ TEST(StudyCheck, ShowsTheValuesOfAllAxesIfOneOverridesAnother) {
   EXPECT_EQ(block["last"]["H"], 0.9);
 }
 
-TEST(StudyCheck, TimesFallsOnTheStudysMeshAndForErrorsOnHalfOfIt) {
+TEST(StudyCheck, MeasuresFallsOnTheMeshOfTheStudyAndForErrorsAlsoOnHalfOfIt) {
   const std::vector<std::string> study{"--preset", "paper", "--H", "1",   "--mu",
                                        "0.4",      "--e",   "1",   "--E", "6e10:8e10:3"};
   const auto plain = checked(study);
@@ -83,7 +83,7 @@ TEST(StudyCheck, TakesNoLongerForABillionPoints) {
   EXPECT_THAT(outcome.out, HasSubstr("size    about 970 GB"));
 }
 
-TEST(StudyCheck, EndsWithTwoAndThePlaceOfAnError) {
+TEST(StudyCheck, ExitsWithTwoAndNamesThePlaceOfAnError) {
   const test::TemporaryFolder folder;
   std::ofstream(folder.path() / "wrong.toml")
       << "[[block]]\nH = 1\nmu = 0.4\ne = 1\nwhere = \"mu > f\"\n";

@@ -31,7 +31,7 @@ protocol::Recipe sample_of(const std::string& axes) {
       .recipe;
 }
 
-TEST(StudyTime, IsThatOfEachFallOnceAndOfEachContactOverTheThreads) {
+TEST(StudyTime, CountsEachFallOnceAndEachContactDividedByThreads) {
   EXPECT_DOUBLE_EQ(time_s(kCost, size_of(20'000, 16'000)), 1'000 * 1.6 + 20'000 * 1e-3 / 2);
   EXPECT_DOUBLE_EQ(time_s(kCost, size_of(20'000, 17)), 2 * 1.6 + 10)
       << "while one thread solves the last fall, the other one waits";
@@ -47,7 +47,7 @@ TEST(StudyTime, IfFallsDominateNamesParametersThatShareAFallAndACheaperStudy) {
             "= 16: about 12 s");
 }
 
-TEST(StudyTime, NamesAllDrawnKeysOfFallsAndCountsTheValuesOfTheOthers) {
+TEST(StudyTime, NamesSampledFallParametersAndCountsTheValuesOfOthers) {
   const auto recipe = sample_of(
       "H = 1\nE = { from = 6e10, to = 8e10 }\nrho = [2600, 2700]\n"
       "A = { distribution = 'normal', mean = 5e-4, sd = 1e-6, from = 1e-4 }\n");

@@ -12,7 +12,7 @@
 
 #include "client/study/study_file.h"
 #include "server/store/store.h"
-#include "tests/client/study/pretended_fall.h"
+#include "tests/client/study/fake_reach.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
 
@@ -58,7 +58,7 @@ class TraceCommand : public testing::Test {
   /// Stores the study `name` in oblique.db without results.
   void store_study(const std::string& name) {
     write_file(name);
-    const Study study = parse_study(kStudies.at(name), name + ".toml", pretended_reach());
+    const Study study = parse_study(kStudies.at(name), name + ".toml", fake_reach());
     const auto table = std::make_shared<const protocol::PointTable>(study.recipe);
     server::Store store((folder_.path() / "oblique.db").string());
     store.commit(std::vector<server::Change>{
@@ -77,7 +77,7 @@ class TraceCommand : public testing::Test {
   }
 };
 
-TEST_F(TraceCommand, APointSolvedInThisProcessEqualsTheStoredOne) {
+TEST_F(TraceCommand, APointSolvedAgainEqualsTheStoredPoint) {
   solve_study("models");
   solve_study("steps");
   for (const auto& [study, point] : {std::pair{"models", "0"}, {"models", "15"}, {"steps", "1"}}) {
@@ -96,7 +96,7 @@ TEST_F(TraceCommand, APointSolvedInThisProcessEqualsTheStoredOne) {
   EXPECT_EQ(all["trace"]["node6y_m"].size(), all["trace"]["state"].size());
 }
 
-TEST_F(TraceCommand, HasTheRowsOfSolve) {
+TEST_F(TraceCommand, WritesTheSameRowsAsSolve) {
   store_study("models");
   const auto trace = run({"trace", "models", "15", "--shape", "--out", "trace.csv"});
   EXPECT_EQ(trace.exit_code, 0) << trace.err;
@@ -110,28 +110,29 @@ TEST_F(TraceCommand, HasTheRowsOfSolve) {
   const auto to_output = run({"solve", "--E", "7e10", "--H", "1", "--mu", "2", "--e", "1",
                               "--elements-per-link", "2", "--trace-shape", "--trace", "-"});
   EXPECT_EQ(to_output.out, text_of("trace.csv"));
-  EXPECT_THAT(to_output.err, HasSubstr("contact ")) << "the summary";
+  EXPECT_THAT(to_output.err, HasSubstr("contact ")) << "the summary is missing";
 }
 
 TEST_F(TraceCommand, MissingPointsAndUnwritableFilesAreNamed) {
   store_study("models");
-  const auto says = [&](std::vector<std::string> words, int exit_code, const char* sentence) {
+  const auto expect_error = [&](std::vector<std::string> words, int exit_code,
+                                const char* sentence) {
     words.insert(words.begin(), "trace");
     const auto outcome = run(words);
     EXPECT_EQ(outcome.exit_code, exit_code) << testing::PrintToString(words) << outcome.err;
     EXPECT_EQ(outcome.out, "");
     EXPECT_THAT(outcome.err, HasSubstr(sentence));
   };
-  says({"model", "0"}, 1, "no study called \"model\"");
-  says({"models", "16"}, 1, "its points are 0 to 15");
-  says({"models", "-1"}, 2, "POINT");
-  says({"models", "first"}, 2, "POINT");
-  says({"models"}, 2, "POINT");
-  says({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
-  says({"models", "0", "--out", "x.jsn"}, 2, "end the name in .csv");
-  says({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
-  says({"models", "0", "--local", "--on-worker"}, 2, "--local");
-  says({"models", "0", "--every", "0"}, 2, "--every");
+  expect_error({"model", "0"}, 1, "no study called \"model\"");
+  expect_error({"models", "16"}, 1, "its points are 0 to 15");
+  expect_error({"models", "-1"}, 2, "POINT");
+  expect_error({"models", "first"}, 2, "POINT");
+  expect_error({"models"}, 2, "POINT");
+  expect_error({"models", "0", "--out", "/nowhere/x.csv"}, 2, "/nowhere/x.csv");
+  expect_error({"models", "0", "--out", "x.jsn"}, 2, "end the name in .csv");
+  expect_error({"models", "0", "--on-worker"}, 2, "--on-worker needs a server");
+  expect_error({"models", "0", "--local", "--on-worker"}, 2, "--local");
+  expect_error({"models", "0", "--every", "0"}, 2, "--every");
 }
 
 TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
@@ -152,7 +153,7 @@ TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
     store.commit(changes);
   }
   const auto outcome = run({"trace", "made-up", "0", "--out", "x.csv"});
-  EXPECT_EQ(outcome.exit_code, 0) << "the trace is what was asked for";
+  EXPECT_EQ(outcome.exit_code, 0) << "a different stored row is no failure";
   EXPECT_THAT(outcome.err, HasSubstr("differs from the stored row"));
   EXPECT_THAT(outcome.err, HasSubstr("fn_peak_N"));
   EXPECT_THAT(outcome.err, HasSubstr("stored by solver 0.1, now solved by "));
@@ -166,41 +167,42 @@ TEST_F(TraceCommand, ADifferentStoredRowIsReportedWithItsColumns) {
 TEST_F(TraceCommand, AWorkerSolvesAPointOfAServer) {
   solve_study("models");
   const test::Server server(folder_, "oblique.db");
-  const auto ask = [&](std::vector<std::string> words) {
+  const auto run_trace = [&](std::vector<std::string> words) {
     words.insert(words.begin(), "trace");
     words.insert(words.end(), {"--server", server.client_url()});
     return run(words);
   };
-  const auto nobody = ask({"models", "3"});
+  const auto nobody = run_trace({"models", "3"});
   EXPECT_EQ(nobody.exit_code, 1);
   EXPECT_THAT(nobody.err, HasSubstr("no worker is connected"));
-  const auto here = ask({"models", "3", "--local", "--out", "here.csv"});
+  const auto here = run_trace({"models", "3", "--local", "--out", "here.csv"});
   EXPECT_EQ(here.exit_code, 0) << here.err;
   EXPECT_THAT(here.err, HasSubstr("solved here, same as stored."));
 
   const test::Worker worker(folder_, server.worker_url(), {"--threads", "1", "--name", "ann"});
-  test::wait_until("the worker is there", [&] {
+  test::wait_until("the server has a worker", [&] {
     return run({"workers", "--server", server.client_url()}).out.find("ann") != std::string::npos;
   });
-  const auto there = ask({"models", "3"});
+  const auto there = run_trace({"models", "3"});
   EXPECT_EQ(there.exit_code, 0) << there.err;
   EXPECT_THAT(there.err, HasSubstr("solved by worker ann ("));
   EXPECT_THAT(there.err, HasSubstr("same as stored."));
   EXPECT_EQ(there.out, text_of("here.csv"));
   for (const char* file : {"fall_here.csv", "fall_there.csv"}) {
     const bool is_here = file == std::string_view("fall_here.csv");
-    ask({"models", "3", "--shape", "--fall", is_here ? "--local" : "--on-worker", "--out", file});
+    run_trace(
+        {"models", "3", "--shape", "--fall", is_here ? "--local" : "--on-worker", "--out", file});
   }
   EXPECT_THAT(text_of("fall_here.csv"), testing::AllOf(StartsWith("t_s,"), HasSubstr(",falling,")));
   EXPECT_EQ(text_of("fall_there.csv"), text_of("fall_here.csv"));
   // `--every 50` prints each 50th instant, ends of phases and the last instant.
-  const auto thinned = ask({"models", "3", "--every", "50"});
-  EXPECT_EQ(thinned.out, ask({"models", "3", "--every", "50", "--local"}).out);
+  const auto thinned = run_trace({"models", "3", "--every", "50"});
+  EXPECT_EQ(thinned.out, run_trace({"models", "3", "--every", "50", "--local"}).out);
   const auto lines = [](const std::string& text) { return std::ranges::count(text, '\n'); };
   EXPECT_GT(lines(thinned.out), lines(there.out) / 50);
   EXPECT_LT(lines(thinned.out), lines(there.out) / 5);
-  EXPECT_THAT(ask({"model", "3"}).err, HasSubstr("no study called \"model\""));
-  EXPECT_THAT(ask({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
+  EXPECT_THAT(run_trace({"model", "3"}).err, HasSubstr("no study called \"model\""));
+  EXPECT_THAT(run_trace({"models", "16"}).err, HasSubstr("its points are 0 to 15"));
 
   // A trace succeeds although its worker is killed, because another worker joins.
   std::ofstream(folder_.path() / "fine.toml") << R"(name = "fine"
@@ -217,7 +219,7 @@ e = 0.9
   const test::Worker other(folder_, server.worker_url(), {"--threads", "1", "--name", "bob"});
   worker.send(SIGKILL);
   const auto outcome = trace.outcome();
-  EXPECT_EQ(outcome.exit_code, 0) << "another worker solves it: " << outcome.err;
+  EXPECT_EQ(outcome.exit_code, 0) << "another worker should solve the trace: " << outcome.err;
   EXPECT_THAT(outcome.out, StartsWith("t_s,"));
 }
 

@@ -110,7 +110,7 @@ CaseResult with_sticks(const std::vector<solver::StickInterval>& sticks) {
   return result;
 }
 
-TEST(LonePairs, AreChosenToBringTheOtherTimesClosest) {
+TEST(UnmatchedPairs, AreChosenSoThatTheOtherTimesAgreeBest) {
   using Pairs = std::vector<std::size_t>;
   EXPECT_EQ(lone_pairs({}, {}), Pairs{});
   EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0}, {1.1, 2.1, 3.1}), Pairs{});
@@ -119,7 +119,8 @@ TEST(LonePairs, AreChosenToBringTheOtherTimesClosest) {
   EXPECT_EQ(lone_pairs({1.0, 5.0, 5.1}, {1.0}), Pairs{1});
   EXPECT_EQ(lone_pairs({1.0, 1.1, 3.0, 5.0, 5.1}, {3.0}), (Pairs{0, 3}));
   EXPECT_EQ(lone_pairs({1.0, 2.0, 3.0, 4.0}, {}), (Pairs{0, 2}));
-  EXPECT_EQ(lone_pairs({1.0, 4.0, 6.0, 8.0}, {4.0, 6.0}), Pairs{0}) << "never two single ones";
+  EXPECT_EQ(lone_pairs({1.0, 4.0, 6.0, 8.0}, {4.0, 6.0}), Pairs{0})
+      << "only adjacent events are removed";
 }
 
 TEST(ContactChanges, AreNoneIfOnlyTimesDiffer) {
@@ -196,7 +197,7 @@ TEST(Outputs, HaveOneOutputPerMajorPeakWithoutRipples) {
   for (const auto& output : outputs_of(result)) {
     names.push_back(output.name);
     EXPECT_TRUE(!output.name.starts_with("major_peak") || solver::find_result_column(output.name))
-        << "what results call it";
+        << "the output has no column of that name";
   }
   EXPECT_EQ(names, (std::vector<std::string>{"fn_peak_N", "major_peak_1_N", "major_peak_2_N",
                                              "ft_peak_N", "duration_s", "stick_total_s", "slide_m",
@@ -204,7 +205,7 @@ TEST(Outputs, HaveOneOutputPerMajorPeakWithoutRipples) {
                                              "vn_out_m_s", "reaction_0_N", "reaction_1_N"}));
 }
 
-TEST(Outputs, AreTheSameQuantityUntilTheModesDiffer) {
+TEST(Outputs, AreComparableUntilTheModesDiffer) {
   const auto outputs = outputs_of(second_order(0.0));
   const auto mode_of = [&](const std::string& name) {
     return std::find_if(outputs.begin(), outputs.end(),
@@ -231,7 +232,7 @@ TEST(Convergence, FindsOrderAndLimitOfEveryOutput) {
   }
 }
 
-TEST(Convergence, ComparesOnlyOutputsWithTheSameModeBeforeThem) {
+TEST(Convergence, ComparesAnOutputOnlyIfTheModesBeforeItAgree) {
   // The coarsest mesh ends after one peak.
   auto coarsest = second_order(0.2);
   coarsest.major_mode = "SC SR sR";
@@ -271,7 +272,8 @@ TEST(MeshLevels, DoubleTheMeshAndChooseStepsForEach) {
     EXPECT_THROW(mesh_levels(model, coarsest, finest), solver::InputError);
   }
   model.integrator = solver::Integrator::kGeneralizedAlpha;
-  EXPECT_EQ(mesh_levels(model, 2, 8)[2].model.dt_s, 1e-6) << "its steps do not depend on the mesh";
+  EXPECT_EQ(mesh_levels(model, 2, 8)[2].model.dt_s, 1e-6)
+      << "steps of generalized-alpha do not depend on the mesh";
 }
 
 TEST(StepLevels, StartAtTheShortestStepOfTheModelAndHalveBothSteps) {
@@ -301,7 +303,7 @@ TEST(StepLevels, ShareTheFallIfTheToleranceControlsItsSteps) {
   const auto exact = exact_fall_level(levels[0]);
   ASSERT_TRUE(exact);
   EXPECT_EQ(exact->model.dt_s, levels[0].model.dt_s);
-  EXPECT_DOUBLE_EQ(exact->model.tolerance, 1e-6) << "a tenth of what the fall is solved for";
+  EXPECT_DOUBLE_EQ(exact->model.tolerance, 1e-6) << "a tenth of the tolerance of the fall";
   EXPECT_NO_THROW(solver::validate(exact->model));
   model.dt_fall_s = 2e-6;
   EXPECT_FALSE(exact_fall_level({"dt", model})) << "its step is halved";

@@ -76,7 +76,7 @@ TEST(Summary, ShowsTheMarginAndWarnsOfASmallOne) {
   EXPECT_THAT(summary_of(result), HasSubstr("closest event: turn; the mode is not reliable\n"));
 }
 
-TEST(Summary, MarksRipplesAndNeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) {
+TEST(Summary, MarksRipplesAndAvoidsMinusZeroAndNeedlessExponents) {
   auto result = some_result();
   result.energy.restitution_J = -3e-17;
   result.vt_out_m_s = -1e-6;
@@ -89,7 +89,7 @@ TEST(Summary, MarksRipplesAndNeverShowsMinusZeroOrAnExponentWherePlainDigitsDo) 
   EXPECT_THAT(text, HasSubstr("123 ms"));
 }
 
-TEST(Summary, HasErrorsIfTheyWereEstimated) {
+TEST(Summary, ShowsEstimatedErrorsIfTheResultHasThem) {
   auto result = some_result();
   EXPECT_THAT(summary_of(result), Not(HasSubstr("errors")));
   result.errors.mode_same = 0;

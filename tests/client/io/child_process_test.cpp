@@ -58,7 +58,7 @@ TEST(ChildProcess, RunsInAProcessGroupOfItsOwnWithNoSignalBlocked) {
   EXPECT_EQ(child.last_output(), "SigBlk:\t0000000000000000");
 }
 
-TEST(ChildProcess, UsesTheDescriptorsHandedToIt) {
+TEST(ChildProcess, InheritsTheGivenDescriptors) {
   Pipe pipe;
   Pipe input;
   auto settings = shell("cat >&3");
@@ -70,11 +70,11 @@ TEST(ChildProcess, UsesTheDescriptorsHandedToIt) {
   input.write.close();
   child.wait();
   std::array<char, 16> bytes{};
-  const auto got = read(pipe.read.number(), bytes.data(), bytes.size());
-  EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(got)), "hello\n");
+  const auto length = read(pipe.read.number(), bytes.data(), bytes.size());
+  EXPECT_EQ(std::string(bytes.data(), static_cast<std::size_t>(length)), "hello\n");
 }
 
-TEST(ChildProcess, ReadsItsInputAndEndsWithOurProcessGroup) {
+TEST(ChildProcess, ReadsItsInputAndEndsWithTheProcessGroupOfItsParent) {
   auto settings = shell("cat");
   const std::string long_text(1'000'000, 'x');
   settings.input = long_text + "end";
@@ -86,11 +86,11 @@ TEST(ChildProcess, ReadsItsInputAndEndsWithOurProcessGroup) {
   EXPECT_EQ(child.output(2'000'000), long_text + "end");
 }
 
-TEST(ChildProcess, OfAMissingProgramIsAnError) {
+TEST(ChildProcess, StartingAMissingProgramIsAnError) {
   EXPECT_THROW(ChildProcess({.program = "/nowhere/program", .arguments = {}}), ProgramNotFound);
 }
 
-TEST(OutputOf, IsOnlyStandardOutputOrTheLastErrorsOfAFailure) {
+TEST(OutputOf, ReturnsStandardOutputOrTheLastErrorsOfAFailedProgram) {
   EXPECT_EQ(output_of(shell("echo words; echo noise >&2; echo more")), "words\nmore\n");
   const auto error_of = [](const std::string& script, int calls) {
     try {

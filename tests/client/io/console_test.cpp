@@ -38,7 +38,7 @@ TEST(Console, MakesControlCharactersVisibleAndColoursErrorsOnlyIfAllowed) {
   EXPECT_EQ(err.str(), "a\\x1b[2J\\nb\n\x1b[1;31moblique:\x1b[0m c\\x1b\nd\n");
 }
 
-TEST(Units, AreChosenToFit) {
+TEST(Units, AreChosenSoThatNumbersAreReadable) {
   EXPECT_EQ(format_duration(0.42), "0.4 s");
   EXPECT_EQ(format_duration(185), "3 min 05 s");
   EXPECT_EQ(format_duration(7800), "2 h 10 min");

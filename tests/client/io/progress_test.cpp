@@ -30,7 +30,7 @@ TEST(Progress, ShowsRateAndTimeLeftInTheBar) {
             "paper [###############---------------] 5/10 50 %, 1 failed, 2 points/s, 2.5 s left");
 }
 
-TEST(Progress, ShowsNoUnknownRateAndNo100PercentBeforeTheEnd) {
+TEST(Progress, HidesAnUnknownRateAndStaysBelow100PercentUntilTheEnd) {
   EXPECT_THAT(progress_line({.study = "s", .points = 100000, .completed = 99999}),
               HasSubstr("(99 %)"));
   EXPECT_EQ(progress_line({.study = "paper", .points = 10}), "paper: 0 of 10 points (0 %)");
@@ -101,7 +101,7 @@ TEST(Progress, ShortensTheBarFirstToFitTheTerminal) {
   EXPECT_EQ(progress_bar(state, 0), "");
 }
 
-TEST(Progress, IsDrawnTenTimesASecondAtMostAndAsWideAsTheTerminalIsThen) {
+TEST(Progress, IsDrawnAtMostTenTimesASecondInTheCurrentWidthOfTheTerminal) {
   std::ostringstream out;
   std::size_t columns = 80;
   Console console(out, out, {.is_terminal = true, .columns = [&columns] { return columns; }});
@@ -117,7 +117,7 @@ TEST(Progress, IsDrawnTenTimesASecondAtMostAndAsWideAsTheTerminalIsThen) {
   EXPECT_LE(text.size() - text.rfind('\r'), 19U + std::string("\r\x1b[K").size());
 }
 
-TEST(Progress, ShowsTheNameOfAStudyWithoutSteeringTheTerminal) {
+TEST(Progress, EscapesControlCodesInTheNameOfAStudy) {
   EXPECT_TRUE(progress_line({.study = "a\x1b[2J", .points = 1}).starts_with("a\\x1b[2J: "));
   EXPECT_TRUE(progress_bar({.study = "a\u202e", .points = 1}).starts_with("a\\u202e ["));
 }
@@ -188,7 +188,7 @@ TEST_F(StatusLineTest, ShowsActivePartsAndErasesItself) {
   EXPECT_EQ(out_.str(), "");
 }
 
-TEST_F(StatusLineTest, IsNotDrawnWithoutAFreeTerminal) {
+TEST_F(StatusLineTest, IsNotDrawnInAFileOrIfHidden) {
   Console file(out_, err_);
   const auto refuse = []() -> std::string { throw std::logic_error("drawn"); };
   {

@@ -58,7 +58,7 @@ class RowOutputTest : public testing::Test {
 };
 
 TEST_F(RowOutputTest, AFileAppearsOnlyWhenItIsFinished) {
-  std::ofstream(file_) << "of before";
+  std::ofstream(file_) << "old content";
   {
     RowOutput out({.format = Format::kCsv, .file = file_});
     out.print(row_);
@@ -73,25 +73,25 @@ TEST_F(RowOutputTest, AFileAppearsOnlyWhenItIsFinished) {
   EXPECT_EQ(files(), 1U);
 }
 
-TEST_F(RowOutputTest, ALinkStaysAndItsTargetIsReplaced) {
+TEST_F(RowOutputTest, ALinkIsKeptAndItsTargetIsReplaced) {
   namespace fs = std::filesystem;
   const std::string link = folder_.file("link.csv");
   for (const std::string target : {"target.csv", "not there yet.csv"}) {
     fs::create_directory(folder_.file("behind"));
     const std::string path = folder_.file("behind/" + target);
-    std::ofstream(folder_.file("behind/target.csv")) << "of before";
+    std::ofstream(folder_.file("behind/target.csv")) << "old content";
     fs::create_symlink("behind/" + target, link);
     write(link);
     EXPECT_TRUE(fs::is_symlink(link));
     EXPECT_FALSE(fs::is_symlink(path));
     EXPECT_EQ(contents(path), "a\n1\n");
-    EXPECT_EQ(files(), 2U) << "the link and the folder";
+    EXPECT_EQ(files(), 2U) << "expected only the link and the folder";
     fs::remove(link);
     fs::remove_all(folder_.file("behind"));
   }
 }
 
-TEST_F(RowOutputTest, ALinkToADeviceOrInACircleIsNotReplaced) {
+TEST_F(RowOutputTest, ALinkToADeviceOrToItselfIsNotReplaced) {
   namespace fs = std::filesystem;
   const std::string link = folder_.file("link.csv");
   fs::create_symlink("/dev/null", link);
@@ -128,7 +128,7 @@ TEST_F(RowOutputTest, AKilledProgramLeavesNoFile) {
   EXPECT_EQ(files(), 0U);
 }
 
-TEST_F(RowOutputTest, TheFormatFollowsFromTheFlagOrTheEnding) {
+TEST_F(RowOutputTest, TheFormatFollowsFromTheFlagOrTheExtension) {
   EXPECT_EQ(format_of_output("", ""), Format::kTable);
   EXPECT_EQ(format_of_output("", "/dev/null"), Format::kTable);
   EXPECT_EQ(format_of_output("", "", kCsvAndJson, Format::kCsv), Format::kCsv);
@@ -159,7 +159,7 @@ TEST_F(RowOutputTest, AFolderOrAFileThatCannotBeCreatedIsWrongUsage) {
   EXPECT_THROW(write(folder_.file("no/such.csv")), solver::InputError);
 }
 
-TEST_F(RowOutputTest, AFullDiskIsAnErrorAndNoFile) {
+TEST_F(RowOutputTest, AFullDiskIsAnErrorAndLeavesNoFile) {
   EXPECT_THROW(write("/dev/full"), std::runtime_error);
 }
 

@@ -38,7 +38,7 @@ protocol::QueryReply points(std::int64_t from, std::int64_t to) {
   return chunk_of({"point", "H"}, rows);
 }
 
-TEST(Formats, DoNotDependOnTheChunks) {
+TEST(Formats, AreTheSameHoweverRowsAreSplitIntoChunks) {
   const auto whole = points(0, 100);
   const std::vector parts{points(0, 1), points(1, 1), points(1, 60), points(60, 100)};
   for (const Format format : {Format::kTable, Format::kCsv, Format::kJson, Format::kJsonLines}) {
@@ -54,7 +54,7 @@ TEST(Formats, AreValidWithoutRows) {
   EXPECT_EQ(printed(Format::kJsonLines, none), "");
 }
 
-TEST(JsonLines, HaveAnObjectALine) {
+TEST(JsonLines, HaveOneObjectPerLine) {
   EXPECT_EQ(
       printed(Format::kJsonLines, {chunk_of({"n", "x", "s"}, {{std::int64_t{1}, 2.0, "a\nb"}}),
                                    chunk_of({"n", "x", "s"}, {{protocol::Value(), 1e-300, "\""}})}),
@@ -84,7 +84,7 @@ TEST(Json, HasListsAsInSolveJson) {
   }
 }
 
-TEST(Json, KeepsATextThatIsNoList) {
+TEST(Json, WritesATextThatIsNoListAsAString) {
   const std::string deep(1000000, '[');
   for (const std::string& text :
        {std::string(), std::string("[1,2"), std::string("17"), std::string("{}"),
@@ -113,7 +113,7 @@ TEST(Table, AlignsNumbersAtThePoint) {
       "       -  -\n");
 }
 
-TEST(Table, WithModesExplainsTheirLetters) {
+TEST(Table, ExplainsTheLettersOfModes) {
   for (const char* column : {"mode", "major_mode"}) {
     EXPECT_TRUE(printed(Format::kTable, {chunk_of({column}, {{"SC"}})})
                     .ends_with("\n(S stick, s slip; C compression, R restitution)\n"));
@@ -149,12 +149,12 @@ TEST(Table, FitsATerminalAndReportsWhatItLeavesOut) {
             "Left out to fit 40 columns (csv and json\nhave all): last\n");
   settings.width = 3;
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr("    1\n"))
-      << "a column stays, however narrow the terminal";
+      << "one column is shown even in a very narrow terminal";
   settings.width = 0;
   EXPECT_THAT(printed(Format::kTable, {rows}, settings), testing::HasSubstr(long_text));
 }
 
-TEST(Table, ThatKeepsAllColumnsWrapsSentencesInTheLast) {
+TEST(Table, WithAllColumnsWrapsSentencesInTheLastColumn) {
   OutputSettings settings;
   settings.width = 40;
   settings.may_leave_out = false;
@@ -191,7 +191,7 @@ std::string whole(const protocol::Table& rows, Format format) {
   return text_of({protocol::chunk_of(rows)}, {.format = format});
 }
 
-TEST(Csv, HoldsEveryNumberToTheLastBit) {
+TEST(Csv, WritesEveryNumberToTheLastBit) {
   protocol::Table rows{.columns = {"x"}};
   for (const double value : kAwkward) {
     rows.rows.push_back({value});
@@ -207,7 +207,7 @@ TEST(Csv, HoldsEveryNumberToTheLastBit) {
   }
 }
 
-TEST(Csv, QuotesWhatWouldBreakALineAndHoldsOtherTextsByteForByte) {
+TEST(Csv, QuotesTextThatWouldBreakALineAndWritesOtherTextUnchanged) {
   EXPECT_EQ(whole(rows_of_texts(
                       {"plain", "a,b", "say \"no\"", "two\nlines", "one\rtwo", "\x1b[2J\u202e"}),
                   Format::kCsv),
@@ -221,7 +221,7 @@ TEST(Csv, DistinguishesNullFromEmptyText) {
   EXPECT_EQ(whole(rows, Format::kCsv), "text\n\"\"\n\n");
 }
 
-TEST(Json, HoldsEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {
+TEST(Json, WritesEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {
   protocol::Table rows{.columns = {"z", "a"}};
   for (const double value : kAwkward) {
     rows.rows.push_back({value, std::int64_t{7}});
@@ -236,7 +236,7 @@ TEST(Json, HoldsEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {
   }
 }
 
-TEST(Json, IsValidForTextsOfAllSortsForNullAndForNoRows) {
+TEST(Json, IsValidForAnyTextForNullAndWithoutRows) {
   const std::vector<std::string> texts{"say \"no\"", "two\nlines", "\x1b[2J\u009b1m\u202ex\x7f",
                                        "\u2066µ🙂"};
   auto rows = rows_of_texts(texts);
@@ -255,21 +255,21 @@ TEST(Json, IsValidForTextsOfAllSortsForNullAndForNoRows) {
             nlohmann::json::array());
 }
 
-TEST(Json, GivesEachColumnAKeyOfItsOwn) {
+TEST(Json, GivesColumnsOfTheSameNameDifferentKeys) {
   const std::int64_t one = 1;
   const protocol::Table rows{.columns = {"a", "b", "a", "a", "a_2"},
                              .rows = {{one, one + 1, one + 2, one + 3, one + 4}}};
   EXPECT_EQ(whole(rows, Format::kJson), "[\n{\"a\":1,\"b\":2,\"a_3\":3,\"a_4\":4,\"a_2\":5}\n]\n");
 }
 
-TEST(Table, ShowsNullAsADashAndKeepsToOneLineARow) {
+TEST(Table, ShowsNullAsADashAndUsesOneLinePerRow) {
   auto rows = rows_of_texts({"two\nlines"});
   rows.rows.emplace_back().emplace_back();
   EXPECT_EQ(whole(rows, Format::kTable), "text\n---------\ntwo lines\n-\n");
   EXPECT_EQ(whole(rows_of_texts({"µ", "ab"}), Format::kTable), "text\n----\nµ\nab\n");
 }
 
-TEST(Table, ShowsNumbersForReading) {
+TEST(Table, RoundsNumbersToReadableDigits) {
   const protocol::Table rows{.columns = {"x"}, .rows = {{-0.0}, {0.1 + 0.2}, {14300.0}, {7e10}}};
   EXPECT_EQ(whole(rows, Format::kTable), "      x\n-------\n    0\n    0.3\n14300\n7e+10\n");
 }

@@ -86,7 +86,7 @@ TEST(Comparison, MergesRipplesInThePhasesOfAResult) {
   EXPECT_EQ(own_case(result).phases_ms, (std::vector<double>{1e3, 2e3, 6e3, 7e3}));
 }
 
-TEST(Comparison, HasARowForEachNumberAndCountsMissingOnes) {
+TEST(Comparison, HasARowForEachPublishedNumberAndCountsMissingNumbers) {
   const auto table = small_table();
   const auto differences = compare(table, own_cases(table, {}));
   EXPECT_EQ(summary_of(differences).counted, 0U);

@@ -50,7 +50,7 @@ class Chunks : public RowStream {
   std::size_t next_ = 0;
 };
 
-TEST(Answers, DoNotDependOnTheChunks) {
+TEST(GatheredData, DoesNotDependOnHowAnswersAreSplitIntoChunks) {
   std::vector<protocol::QueryReply> chunks;
   protocol::Table table{.columns = {"mu", "mode"}};
   table.rows = {{0.1, {}}};
@@ -74,7 +74,7 @@ TEST(Answers, DoNotDependOnTheChunks) {
               ElementsAre(AnswerColumn::kNoWord, 0U, 1U, AnswerColumn::kNoWord, 0U));
 }
 
-TEST(Cells, OfAGridFollowItsValuesAndMarkUnsolvedOnes) {
+TEST(Cells, OfAGridAreAtItsAxisValuesAndMarkUnsolvedPoints) {
   const Answer answer{numbers({1, 2, 1, 2, 2}), numbers({10, 10, 20, 20, 20}),
                       numbers({5, kNone, 7, kNone, kNone}),
                       texts({"solved", "failed", "solved", "solved", "solved"})};
@@ -98,14 +98,14 @@ TEST(Cells, WithSeveralPointsHaveTheMean) {
   EXPECT_EQ(gathered.cells.states[0], CellState::kSolved);
 }
 
-TEST(Cells, OfTextsHaveTheMostFrequentTextAndCounts) {
+TEST(Cells, ShowTheMostFrequentTextWithCounts) {
   const Answer answer{numbers({1, 1, 1, 1, 2, 2, 3, 4}), numbers({1, 1, 1, 1, 1, 1, 1, 1}),
                       texts({"rare", "SC", "", "SC", "SC", "rare", "SC", ""}),
                       texts(std::vector<std::string>(8, "solved"))};
   const auto gathered =
       gathered_in(answer, cells_around({1, 2, 3, 4}, false), cells_around({1}, false));
   EXPECT_THAT(gathered.cells.names, ElementsAre("SC", "rare", "SC", ""))
-      << "of equally many the first met";
+      << "of equally frequent texts the first is taken";
   EXPECT_EQ(gathered.cells.states[3], CellState::kNoValue);
   EXPECT_EQ(gathered.most_in_a_cell, 3U);
   EXPECT_THAT(gathered.points_of_name, ElementsAre(Pair("SC", 4U), Pair("rare", 2U)));
@@ -126,10 +126,10 @@ TEST(Cells, OfEqualSizeContainAllScatteredPoints) {
   EXPECT_EQ(gathered.cells.states.size(), 40U);
 }
 
-TEST(AxisValues, AreThoseOfTheStudyAndOthersThatRowsHave) {
+TEST(AxisValues, AreThoseOfTheStudyAndOfAdditionalRows) {
   EXPECT_THAT(axis_values({1, 3}, numbers({2, 2, 3, kNone, 1})), ElementsAre(1, 2, 3));
   EXPECT_THAT(axis_values({0.3}, numbers({std::nextafter(0.3, 1.0)})), ElementsAre(0.3))
-      << "the same value, computed by another machine";
+      << "values that differ by rounding are one value";
 }
 
 TEST(GatheredLines, AreSortedAndHaveGapsForFailedAndUnsolvedPoints) {
@@ -144,7 +144,7 @@ TEST(GatheredLines, AreSortedAndHaveGapsForFailedAndUnsolvedPoints) {
   EXPECT_EQ(gathered.most_at_a_place, 1U);
 }
 
-TEST(GatheredLines, OfSeveralPointsAtOnePlaceHaveTheMean) {
+TEST(GatheredLines, UseTheMeanOfPointsWithTheSameX) {
   const auto gathered = gathered_lines({numbers({1, 1, 2}), numbers({2, 4, 7})}, {});
   ASSERT_EQ(gathered.curves.size(), 1U);
   EXPECT_THAT(gathered.curves[0].y, ElementsAre(3, 7));

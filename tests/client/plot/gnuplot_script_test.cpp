@@ -80,7 +80,7 @@ plot $data1 using 1:2 with linespoints ls 1 notitle
 )"));
 }
 
-TEST(GnuplotScript, DoesNotChangeTextsFromOutside) {
+TEST(GnuplotScript, EscapesTextsSoThatTheyAppearUnchanged) {
   EXPECT_EQ(gnuplot_text("it's\n`rm` \"x\" $y"), "'it\u2019s\\n`rm` \"x\" $y'");
   Figure figure = test::lines_of(1, 2);
   figure.title = "a_b^c {x} `rm` it's";
@@ -107,7 +107,7 @@ TEST(GnuplotScript, OfCategoriesHasPatternsLettersBordersAndPercentages) {
   EXPECT_THAT(text, HasSubstr("# Borders of categories: x y dx dy\n"));
 }
 
-TEST(GnuplotScript, OfCategoriesLikeNoiseHasOnlyColours) {
+TEST(GnuplotScript, DrawsScatteredCategoriesWithoutBordersAndPatterns) {
   Figure figure = test::category_map();
   for (std::size_t i = 0; i < figure.panels[0].cells->values.size(); ++i) {
     figure.panels[0].cells->values[i] = static_cast<double>((i % 30 * 7 + i / 30 * 11) % 3);
@@ -205,7 +205,7 @@ TEST(Gnuplot, ReportsTheReasonOfAFailure) {
   }
 }
 
-TEST(PictureFormat, FollowsFromTheFileUnlessItIsNamed) {
+TEST(PictureFormat, FollowsFromTheFileNameUnlessAFlagNamesIt) {
   EXPECT_EQ(picture_format("", "a.svg"), PictureFormat::kSvg);
   EXPECT_EQ(picture_format("", "a.b/c.png"), PictureFormat::kPng);
   EXPECT_EQ(picture_format("", "a.gp"), PictureFormat::kScript);
@@ -213,7 +213,7 @@ TEST(PictureFormat, FollowsFromTheFileUnlessItIsNamed) {
   EXPECT_EQ(picture_format("", ""), PictureFormat::kSvg);
 }
 
-TEST(PictureSize, IsTwoWholeNumbersThatCanBeRead) {
+TEST(PictureSize, IsTwoWholeNumbersOfALegibleSize) {
   EXPECT_EQ(size_of("480x360").width, 480.0);
   EXPECT_EQ(size_of("480x360").height, 360.0);
   for (const char* text : {"", "480", "x", "480x", "0x0", "480.5x360", "1e9x300", "nanx300"}) {
@@ -230,7 +230,7 @@ TEST(FigureTable, OfAMapHasOneRowPerCellWithItsState) {
   }
 }
 
-TEST(FigureTable, OfAMapHasTheValuesOfTheStudyIfThereAreAny) {
+TEST(FigureTable, OfAMapHasTheAxisValuesOfTheStudyIfItListsThem) {
   Cells cells = test::counted_cells(2, 1);
   cells.x.values = {0.03, 0.1};
   cells.y.values = {0.7};

@@ -57,7 +57,7 @@ PointHistory small_history() {
   return history;
 }
 
-TEST(PointSpans, ArePhasesFollowedByStick) {
+TEST(PointSpans, ListPhasesBeforeStickIntervals) {
   const auto spans = panel_of(small_history(), PointPanel::kForces).spans;
   ASSERT_EQ(spans.size(), 3U);
   EXPECT_EQ(spans[0].kind, Span::Kind::kCompression);
@@ -78,7 +78,7 @@ TEST(PointPanels, HysteresisSeparatesBranchesThatMeetAtTheTurn) {
   EXPECT_DOUBLE_EQ(curves[0].y[10], 1000.0);
   EXPECT_TRUE(std::isnan(curves[0].x[11]));
   EXPECT_DOUBLE_EQ(curves[1].x[0], curves[0].x[10]);
-  EXPECT_GT(curves[1].x[10], 0.0) << "an indentation is left";
+  EXPECT_GT(curves[1].x[10], 0.0) << "an indentation remains when the normal force is zero";
 }
 
 TEST(PointEnergies, AreLostByPOrStoredInTheElement) {

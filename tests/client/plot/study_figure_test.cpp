@@ -83,7 +83,7 @@ TEST(Map, OfNumbersHasOneCellPerPointAndAColourScale) {
   EXPECT_EQ(figure.subtitle, "e = 1, 3 points");
 }
 
-TEST(Map, WithARangeMentionsValuesOutside) {
+TEST(Map, WithARangeMentionsValuesOutsideOfIt) {
   const Figure figure = figure_from({.map = "fn_peak_N", .range = "2:20"}, kMapColumns,
                                     {{1.0, 0.5, 1.0, "solved"}, {2.0, 0.5, 30.0, "solved"}});
   EXPECT_EQ(figure.colours->range, (Range{2.0, 20.0}));
@@ -91,13 +91,13 @@ TEST(Map, WithARangeMentionsValuesOutside) {
               Contains(HasSubstr("Values range from 1 to 30; those outside the scale")));
 }
 
-TEST(Map, WithoutRowsStatesThis) {
+TEST(Map, WithoutRowsReportsThatNothingCanBeDrawn) {
   const Figure empty = figure_from({.map = "fn_peak_N"}, kMapColumns, {});
   EXPECT_TRUE(empty.is_empty);
   EXPECT_THAT(empty.notes, Contains("Nothing to draw: no cell has a value."));
 }
 
-TEST(Map, OfModesSortsThemByTheirPoints) {
+TEST(Map, SortsModesByTheirNumbersOfPoints) {
   const Figure figure = figure_from(
       {.map = "mode"}, {"mu", "H", "mode", "status"},
       {{1.0, 0.5, "sC", "solved"}, {2.0, 0.5, "SC", "solved"}, {3.0, 1.0, "SC", "solved"}});
@@ -125,7 +125,7 @@ TEST(Map, OfManyModesCombinesThoseWithVeryFewPoints) {
   EXPECT_THAT(figure.notes, Contains(HasSubstr("--format csv lists all 20")));
 }
 
-TEST(Lines, HaveNamesIfFewAndColoursByValueIfMany) {
+TEST(Lines, AreLabelledIfFewAndColouredByValueIfMany) {
   Rows rows;
   for (int i = 0; i < 9; ++i) {
     rows.push_back({1.0, 5.0 + i, 0.1 * i});
@@ -143,7 +143,7 @@ TEST(Lines, HaveNamesIfFewAndColoursByValueIfMany) {
   EXPECT_EQ(few.panels[0].curves[2].name, "e = 0.2");
 }
 
-TEST(Outputs, AreRefusedWithTheFlagIfUnknown) {
+TEST(Outputs, AnUnknownOutputIsRefusedAndItsFlagIsNamed) {
   for (const auto& [flag, request] :
        {std::pair<std::string, PlotRequest>{"--lines", {.lines = "fn_peak"}},
         {"--map", {.map = "fn_peak"}},
@@ -199,14 +199,14 @@ TEST(Histogram, CountsEachValueOnceInTheBinThatBeginsAtIt) {
   }
 }
 
-TEST(Histogram, WithALogarithmicAxisOrWithoutValuesReportsWhatIsLeftOut) {
+TEST(Histogram, ReportsRowsThatItLeavesOut) {
   const Figure figure = figure_from({.histogram = "margin", .is_x_logarithmic = true}, {"margin"},
                                     {{0.0}, {0.1}, {1.0}, {10.0}});
   EXPECT_THAT(figure.notes, ElementsAre("1 of 4 points have no value or lie outside the axis."));
   EXPECT_TRUE(figure_from({.histogram = "margin"}, {"margin"}, {}).is_empty);
 }
 
-TEST(Histogram, OfTextsIsSortedAndCombinesTheRareOnes) {
+TEST(Histogram, SortsTextsAndCombinesRareTexts) {
   Rows rows;
   for (int i = 0; i < 40; ++i) {
     rows.insert(rows.end(), static_cast<std::size_t>(i + 1), {"mode " + std::to_string(i)});
@@ -218,7 +218,7 @@ TEST(Histogram, OfTextsIsSortedAndCombinesTheRareOnes) {
   EXPECT_EQ(std::accumulate(bars.heights.begin(), bars.heights.end(), 0.0), 820.0);
 }
 
-TEST(Axes, AreLabelledForPeopleWithTheirUnits) {
+TEST(Axes, HaveReadableLabelsWithUnits) {
   EXPECT_EQ(axis_of("duration_s", "s").label, "duration of contact [\u00b5s]");
   EXPECT_EQ(axis_of("duration_s", "s").per_unit, 1e6);
   EXPECT_EQ(axis_of("mu", "").label, "coefficient of friction \u03bc");
@@ -294,7 +294,7 @@ TEST(Blocks, AreChosenByTheRequestedAxesAndValues) {
   EXPECT_EQ(number_for({.lines = "slide_m", .x = "H", .at = {"mu=0.4"}}), 1U);
   EXPECT_EQ(number_for({.lines = "slide_m", .at = {"e=0.8"}}), 3U);
   EXPECT_EQ(number_for({.block = "1"}), 1U);
-  EXPECT_EQ(number_for({.map = "slide_m", .x = "H", .y = "e"}), 0U) << "none has both";
+  EXPECT_EQ(number_for({.map = "slide_m", .x = "H", .y = "e"}), 0U) << "no block has both axes";
 }
 
 TEST(Blocks, AreAllDrawnIfNoneIsChosen) {
@@ -306,10 +306,10 @@ TEST(Blocks, AreAllDrawnIfNoneIsChosen) {
   EXPECT_THAT(all.find("H")->values, ElementsAre(0.9, 0.96, 1.0, 1.04, 1.1));
   const auto points =
       shape_of_study("[[block]]\nH = 1\nmu = 1\ne = 1\n[[block]]\nH = 1\nmu = 2\ne = 1\n");
-  EXPECT_FALSE(points.is_one_block) << "single points are no picture each";
+  EXPECT_FALSE(points.is_one_block) << "blocks of one point are drawn together";
 }
 
-TEST(Blocks, AreRefusedIfUnknown) {
+TEST(Blocks, AnUnknownBlockIsRefused) {
   for (const std::string block : {"0", "4", "-1", "1.5", "first", ""}) {
     try {
       (void)shape_of_study(kThreeBlocks, {.block = block + (block.empty() ? " " : "")});
@@ -320,7 +320,7 @@ TEST(Blocks, AreRefusedIfUnknown) {
   }
 }
 
-TEST(Blocks, OfAHundredThousandAreCombinedQuickly) {
+TEST(Blocks, AHundredThousandBlocksAreCombinedQuickly) {
   protocol::Recipe recipe;
   const auto study = parse_study("name = \"s\"\n[[block]]\nH = 1\nmu = [1, 2]\ne = 1\n", "s.toml",
                                  [](const auto&...) {});
@@ -356,13 +356,13 @@ TEST(Condition, FixesAnOpenAxisAtItsFirstValueAndReportsIt) {
                           HasSubstr("e has the values 0.5, 0.8, 1; drawn: e = 0.5")));
 }
 
-TEST(Condition, LeavesAxesOpenThatWhereMentions) {
+TEST(Condition, DoesNotFixAxesInTheWhereClause) {
   const auto condition = condition_of({.where = "e > 0.6 OR slide_m > 1"}, grid(),
                                       {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "(e > 0.6 OR slide_m > 1) AND H = 0.5");
 }
 
-TEST(At, AcceptsARoundedValueFromATable) {
+TEST(FlagAt, AcceptsAValueAsRoundedInATable) {
   const auto condition =
       condition_of({.at = {"e=0.8", "H=1"}}, grid(), {chosen_axis("--x", "mu", grid())}, true);
   EXPECT_EQ(condition.sql, "e = 0.8 AND H = 1");
@@ -373,7 +373,7 @@ TEST(At, AcceptsARoundedValueFromATable) {
               testing::StartsWith("H = 0.43333333"));
 }
 
-TEST(At, NamesTheNearestValueForAnUnknownOne) {
+TEST(FlagAt, SuggestsTheNearestValueForAnUnknownValue) {
   EXPECT_THAT(error_of({.at = {"e=0.79"}}, grid()),
               HasSubstr("the nearest is e=0.8. It has the values 0.5, 0.8, 1"));
   EXPECT_THAT(error_of({.at = {"mu=1"}}, grid()), HasSubstr("is an axis of the picture"));
@@ -384,7 +384,7 @@ TEST(At, NamesTheNearestValueForAnUnknownOne) {
   EXPECT_THAT(error_of({.at = {"e=1", "e=0.5"}}, grid()), HasSubstr("has a value already"));
 }
 
-TEST(Axes, AreRefusedWithTheNearestIfUnknown) {
+TEST(Axes, AnUnknownAxisIsRefusedWithTheNearestName) {
   try {
     (void)chosen_axis("--x", "muu", grid());
     FAIL();
@@ -395,7 +395,7 @@ TEST(Axes, AreRefusedWithTheNearestIfUnknown) {
   EXPECT_EQ(chosen_axis("--x", "slide_m / 2", grid()).column, "slide_m / 2");
 }
 
-TEST(UsualPicture, SuitsTheStudy) {
+TEST(DefaultPlot, DependsOnTheAxesOfTheStudy) {
   const auto usual = [](const std::string& blocks) {
     return completed({}, shape_of_study(blocks));
   };
@@ -405,7 +405,7 @@ TEST(UsualPicture, SuitsTheStudy) {
   EXPECT_EQ(completed({.histogram = "e"}, grid()).map, "");
   const auto few =
       usual("[[block]]\nH = { from = 0.2, to = 1, count = 9 }\nmu = [0.4, 0.8]\ne = 1\n");
-  EXPECT_EQ(few.lines, "fn_peak_N") << "a line a value where an axis has few";
+  EXPECT_EQ(few.lines, "fn_peak_N") << "an axis of few values gives one line per value";
   EXPECT_EQ(few.x, "H");
   EXPECT_EQ(usual("[[block]]\nH = 0.5\nmu = 1\ne = 1\n").histogram, "fn_peak_N");
   const auto scattered = usual(

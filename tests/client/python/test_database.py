@@ -64,20 +64,20 @@ def test_results_equal_those_of_solve_in_the_stored_digits(database):
 
 
 def test_sql_is_answered_and_cannot_change_anything(database):
-    asked = oblique.Database(database)
-    answer = asked.sql("SELECT count(*) AS n, max(mu) AS m, min(mu) AS m FROM runs")
+    opened = oblique.Database(database)
+    answer = opened.sql("SELECT count(*) AS n, max(mu) AS m, min(mu) AS m FROM runs")
     assert (answer.m.tolist(), answer.keys()) == ([2.0], ["n", "m", "m_2"])
     for statement in ("DELETE FROM results", "SELECT 1; SELECT 2", "SELEC 1", "ATTACH 'x' AS y"):
         with pytest.raises(ValueError):
-            asked.sql(statement)
+            opened.sql(statement)
 
 
 def test_a_database_is_read_after_a_change_of_folder(database, tmp_path, monkeypatch):
     (tmp_path / "copy.db").write_bytes(pathlib.Path(database).read_bytes())
     monkeypatch.chdir(tmp_path)
-    asked = oblique.Database("copy.db")
+    opened = oblique.Database("copy.db")
     monkeypatch.chdir("/")
-    assert len(asked.query("sweep", limit=2)) == 2
+    assert len(opened.query("sweep", limit=2)) == 2
 
 
 def test_studies_have_their_progress(database):
@@ -114,8 +114,8 @@ def test_new_rows_are_visible_to_the_next_query(database, tmp_path):
     file = str(tmp_path / "copy.db")
     with sqlite3.connect(database) as one, sqlite3.connect(file) as other:
         one.backup(other)
-    asked = oblique.Database(file)
-    assert len(asked.query("sweep")) == 36
+    opened = oblique.Database(file)
+    assert len(opened.query("sweep")) == 36
     run_oblique("run", "--H", "1", "--mu", "0.3", "--e", "0.7", "--name", "more", "--db", file)
-    assert [study.name for study in asked.studies()] == ["sweep", "more"]
-    assert len(asked.query("more")) == 1
+    assert [study.name for study in opened.studies()] == ["sweep", "more"]
+    assert len(opened.query("more")) == 1

@@ -31,8 +31,8 @@ def test_ctrl_c_ends_work_with_keyboard_interrupt(work, database):
         while len(os.listdir(f"/proc/{process.pid}/task")) <= before:
             os.sched_yield()
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate()
-    assert said.rstrip().endswith("KeyboardInterrupt")
+        _, errors = process.communicate()
+    assert errors.rstrip().endswith("KeyboardInterrupt")
     assert process.returncode in (-signal.SIGINT, 130)
 
 
@@ -64,14 +64,14 @@ SENTENCE = r'multiprocessing\.set_start_method\("spawn"\)'
 
 
 def test_every_call_in_the_child_of_a_fork_says_how_to_start_processes_instead(database):
-    asked = oblique.Database(database)
+    opened = oblique.Database(database)
     calls = [
         lambda: oblique.solve(1, 0.4, 1),
         lambda: oblique.trace(1, 0.4, 1),
         lambda: oblique.solve_many(1, [0.4], 1),
         lambda: oblique.Database(database),
-        lambda: asked.query("sweep"),
-        lambda: asked.studies(),
+        lambda: opened.query("sweep"),
+        lambda: opened.studies(),
     ]
     child = os.fork()
     if child == 0:
@@ -83,7 +83,7 @@ def test_every_call_in_the_child_of_a_fork_says_how_to_start_processes_instead(d
         finally:
             os._exit(1)
     assert os.waitpid(child, 0)[1] == 0
-    assert len(asked.query("sweep")) == 36
+    assert len(opened.query("sweep")) == 36
 
 
 def test_processes_of_a_spawned_pool_solve_and_send_results_back():

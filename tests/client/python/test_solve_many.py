@@ -106,10 +106,10 @@ def test_missing_values_of_pandas_fail_alone():
 
 
 def test_progress_is_reported_to_the_end_and_may_stop_the_work():
-    told = []
+    reported = []
     mu = np.linspace(0, 1, 500)
-    one = oblique.solve_many(1, mu, 1, progress=lambda *counts: told.append(counts), threads=np.int64(1))
-    assert told == sorted(told) and told[-1] == (500, 500)
+    one = oblique.solve_many(1, mu, 1, progress=lambda *counts: reported.append(counts), threads=np.int64(1))
+    assert reported == sorted(reported) and reported[-1] == (500, 500)
     assert np.array_equal(one.fn_peak_N, oblique.solve_many(1, mu, 1, threads=3).fn_peak_N)
 
     def enough(done, of):

@@ -26,8 +26,8 @@ rows: int = len(answer)
 def strictly_typed(cache, *words):
     mypy = pytest.importorskip("mypy.api")
     os.environ["MYPYPATH"] = str(pathlib.Path(oblique.__file__).parent.parent)
-    said, errors, code = mypy.run(["--strict", "--cache-dir", str(cache), *words])
-    assert code == 0, said + errors
+    output, errors, code = mypy.run(["--strict", "--cache-dir", str(cache), *words])
+    assert code == 0, output + errors
 
 
 def test_a_program_that_uses_the_module_is_typed_strictly(tmp_path):

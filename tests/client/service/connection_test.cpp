@@ -52,8 +52,8 @@ TEST(Connection, RefusesAnInvalidAddress) {
 
 TEST(Connection, StopsWaitingWhenKeepWaitingReturnsFalse) {
   const oblique::test::ReservedPort nobody;
-  int asked = 0;
-  Connection connection(at(nobody.url(), kLong_ms), [&asked] { return ++asked < 3; });
+  int calls = 0;
+  Connection connection(at(nobody.url(), kLong_ms), [&calls] { return ++calls < 3; });
   EXPECT_THROW(connection.workers(), Interrupted);
 }
 
@@ -137,7 +137,7 @@ TEST(Connection, SendsARequestAgainOverASilentConnection) {
   EXPECT_EQ(ids, std::vector<std::uint64_t>(ids.size(), ids.front()));
 }
 
-TEST(Connection, SendsARequestOnceAndIgnoresASecondAnswer) {
+TEST(Connection, SendsARequestOnceAndIgnoresARepeatedAnswer) {
   std::atomic<unsigned> requests{0};
   const ScriptedServer server([&](const protocol::ClientRequest& request) {
     auto replies = workers_reply(request, ++requests);
@@ -152,7 +152,7 @@ TEST(Connection, SendsARequestOnceAndIgnoresASecondAnswer) {
   }
 }
 
-TEST(Connection, WithATellReportsSilenceAndTheNextAnswer) {
+TEST(Connection, ReportsSilenceAndTheNextAnswer) {
   const oblique::test::ReservedPort port;
   std::unique_ptr<ScriptedServer> server;
   std::vector<std::string> sentences;

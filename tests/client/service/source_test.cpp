@@ -132,7 +132,7 @@ TEST_F(SourceTest, ReportsAWrongStatementAsWrongUsageForFilesAndServers) {
   EXPECT_THROW(source->query("SELECT 1"), ServerError);
 }
 
-TEST(ResultQuery, IsARequestOfTheSameParts) {
+TEST(ResultQuery, BecomesARequestWithTheSameClauses) {
   const auto plain = request_for({.study = "a"}).question();
   EXPECT_FALSE(plain.has_limit());
   EXPECT_TRUE(plain.select().empty());
@@ -145,7 +145,7 @@ TEST(ResultQuery, IsARequestOfTheSameParts) {
   EXPECT_EQ(full.limit(), 5U);
 }
 
-TEST(ResultQuery, EachFlagIsCheckedAndNamed) {
+TEST(ResultQuery, AnErrorNamesTheWrongFlag) {
   const auto refusal = [](const ResultQuery& query) -> std::string {
     try {
       check(query);
@@ -219,13 +219,13 @@ TEST(FollowedStudy, IsFollowedByItsNumberAfterARename) {
   source.held.set_study_id(7);
   source.held.set_name("first");
   FollowedStudy followed(source, "first");
-  std::string said;
-  const Tell tell = [&said](const std::string& sentence) { said += sentence; };
+  std::string printed;
+  const Tell tell = [&printed](const std::string& sentence) { printed += sentence; };
   EXPECT_EQ(followed.status(tell).name(), "first");
   source.held.set_name("other");
   EXPECT_EQ(followed.status(tell).name(), "other");
   EXPECT_EQ(followed.status(tell).name(), "other");
-  EXPECT_EQ(said, "first is now called other.") << "it is said once";
+  EXPECT_EQ(printed, "first is now called other.") << "the new name is reported once";
   source.held.set_study_id(8);
   EXPECT_THROW(followed.status(tell), std::runtime_error) << "study 7 was deleted";
 }

@@ -30,7 +30,7 @@ std::string csv_error(const std::string& text, const std::string& name = "drop")
 
 TEST(CsvFile, GivesTheNumbersOfAColumn) {
   EXPECT_EQ(column("drop,speed\n0.4,1\n0.6,2\n"), (std::vector{0.4, 0.6}));
-  EXPECT_EQ(column("speed,drop\n1,0.4"), (std::vector{0.4})) << "without a line break at the end";
+  EXPECT_EQ(column("speed,drop\n1,0.4"), (std::vector{0.4})) << "the last line has no line break";
 }
 
 TEST(CsvFile, ReadsFilesOfSpreadsheets) {
@@ -54,7 +54,7 @@ TEST(CsvFile, TakesIntegratorsByName) {
 }
 
 // Line numbers count every line break of the file, also those in quoted fields.
-TEST(CsvFile, NamesFileLineAndColumnOfWhatIsWrong) {
+TEST(CsvFile, AnErrorNamesFileLineAndColumn) {
   EXPECT_THAT(csv_error("drop\n0.4\n0.x\n"),
               HasSubstr("measured.csv:3: column `drop`: \"0.x\" is not a number"));
   EXPECT_THAT(csv_error("drop,b\n0.4,\"\n\n\"\n,1\n"),
@@ -85,7 +85,7 @@ TEST(CsvFiles, AreFoundBesideTheStudyAndMustBeFiles) {
   { std::ofstream(folder.file("beside.csv")) << "drop\n0.4\n"; }
   CsvFiles files(folder.path());
   EXPECT_EQ(files.at("beside.csv").columns().size(), 1U);
-  EXPECT_EQ(files.at(folder.file("beside.csv")).columns().size(), 1U) << "also by the whole path";
+  EXPECT_EQ(files.at(folder.file("beside.csv")).columns().size(), 1U) << "an absolute path";
   for (const std::string path : {"nowhere.csv", ".", "/dev/zero"}) {
     EXPECT_THROW(files.at(path), solver::InputError) << path;
   }

@@ -11,7 +11,7 @@
 
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/point_table.h"
-#include "tests/client/study/pretended_fall.h"
+#include "tests/client/study/fake_reach.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -33,12 +33,12 @@ PointFlags flags_of(const std::map<std::string, std::string>& axes) {
 }
 
 protocol::PointTable table_of(const PointFlags& flags) {
-  return protocol::PointTable(recipe_of_flags(flags, pretended_reach()));
+  return protocol::PointTable(recipe_of_flags(flags, fake_reach()));
 }
 
 std::string error_of(const PointFlags& flags) {
   try {
-    points_of_flags(flags, pretended_reach());
+    points_of_flags(flags, fake_reach());
   } catch (const solver::InputError& error) {
     return error.what();
   }
@@ -84,7 +84,7 @@ TEST(PointFlags, TakeDistributionsInSamplesAndExpressions) {
                          {"I", "A^2/(4*pi)"}});
   flags.sample = "sobol:100000:5";
   flags.where = "mu > 0.5 * e";
-  const auto recipe = recipe_of_flags(flags, pretended_reach());
+  const auto recipe = recipe_of_flags(flags, fake_reach());
   const auto& block = recipe.blocks(0);
   EXPECT_EQ(block.sample().kind(), protocol::SAMPLE_SOBOL);
   EXPECT_EQ(block.sample().count(), 100'000U);
@@ -97,7 +97,7 @@ TEST(PointFlags, TakeDistributionsInSamplesAndExpressions) {
   EXPECT_FALSE(block.axes(3).distribution().has_to());
 }
 
-TEST(PointFlags, TakeAxesSideBySide) {
+TEST(PointFlags, ZipPairsTheValuesOfAxes) {
   auto flags = flags_of({{"H", "0.5,0.6"}, {"mu", "0.4,0.4"}, {"length2", "0.3,0.4"}});
   flags.zip = true;
   const auto table = table_of(flags);
@@ -105,7 +105,7 @@ TEST(PointFlags, TakeAxesSideBySide) {
   EXPECT_EQ(table.model(table.point(0).model).lengths_m[1], 0.3);
 }
 
-TEST(PointFlags, ShapeTheModelWithOneValueAndMakeAnAxisOfSeveral) {
+TEST(PointFlags, SetAModelParameterByOneValueAndAnAxisBySeveral) {
   auto flags = flags_of({{"tip_mass", "0.01"}, {"k", "1e7,2e7"}, {"H", "0.5"}});
   flags.preset = "printed";
   flags.lengths = "0.4,0.3";
@@ -122,7 +122,7 @@ TEST(PointFlags, RefuseWrongValuesWithTheFlagAsItWasTyped) {
   const struct {
     const char* key;
     const char* text;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {"mu", "", "a value is missing"},
       {"mu", "abc", "\"abc\" is not a number"},
@@ -153,18 +153,18 @@ TEST(PointFlags, RefuseWrongValuesWithTheFlagAsItWasTyped) {
       {"H", "1.3", "the length of the chain, 1.2 m"},
       {"H", "1.19", "1.179156 m"},
   };
-  for (const auto& [key, text, says] : wrong) {
+  for (const auto& [key, text, expected] : wrong) {
     const auto message = error_of(flags_of({{key, text}}));
     EXPECT_THAT(message, StartsWith(flag_of_key(key) + " " + text + ": "));
-    EXPECT_THAT(message, HasSubstr(says));
+    EXPECT_THAT(message, HasSubstr(expected));
   }
 }
 
-TEST(PointFlags, NameOtherWrongFlags) {
+TEST(PointFlags, AWrongSampleOrFilterIsRefusedAndItsFlagIsNamed) {
   const struct {
     std::string PointFlags::*flag;
     const char* text;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {&PointFlags::sample, "sobol", "--sample sobol: this is not a sample: write kind:count:seed"},
       {&PointFlags::sample, "sobol:x", "--sample sobol:x: this is not a sample"},
@@ -178,10 +178,10 @@ TEST(PointFlags, NameOtherWrongFlags) {
       {&PointFlags::lengths, "0.4,-0.3", "--lengths 0.4,-0.3: lengths = -0.3 m is not allowed"},
       {&PointFlags::lengths, "mu,mu", "--lengths mu,mu: \"mu\" is not a number; write the length"},
   };
-  for (const auto& [flag, text, says] : wrong) {
+  for (const auto& [flag, text, expected] : wrong) {
     auto flags = flags_of({{"H", "0.5:0.6:2"}});
     flags.*flag = text;
-    EXPECT_THAT(error_of(flags), StartsWith(says));
+    EXPECT_THAT(error_of(flags), StartsWith(expected));
   }
   auto flags = flags_of({{"links", "2"}});
   flags.lengths = "0.4,0.3";
@@ -194,22 +194,20 @@ TEST(PointFlags, NameOtherWrongFlags) {
   EXPECT_THAT(error_of(flags), HasSubstr("did you mean `normal`?"));
 }
 
-TEST(StudyFlags, NameTheSameStudyForTheSamePointsAndAnotherForOthers) {
+TEST(StudyFlags, GiveEqualPointsTheSameStudyNameAndOtherPointsAnother) {
   const auto name = [](const PointFlags& flags) {
-    return name_of_recipe(recipe_of_flags(flags, pretended_reach()));
+    return name_of_recipe(recipe_of_flags(flags, fake_reach()));
   };
   EXPECT_EQ(name(flags_of({})), name(flags_of({})));
   EXPECT_NE(name(flags_of({})), name(flags_of({{"mu", "0.5"}})));
   auto on_paper = flags_of({});
   on_paper.preset = "paper";
-  EXPECT_EQ(name(on_paper), "sweep-8344f39b") << "the name stays for ever";
+  EXPECT_EQ(name(on_paper), "sweep-8344f39b") << "the name of a study must never change";
 }
 
 TEST(StudyFlags, TakeAFileOrPointsAndNotBoth) {
   const std::string paper = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
-  const auto study = [](const StudyFlags& flags) {
-    return study_of_flags(flags, pretended_reach());
-  };
+  const auto study = [](const StudyFlags& flags) { return study_of_flags(flags, fake_reach()); };
   EXPECT_THROW(study({}), solver::InputError);
   StudyFlags flags;
   flags.points = flags_of({});
@@ -226,18 +224,18 @@ TEST(StudyFlags, TakeAFileOrPointsAndNotBoth) {
   EXPECT_THROW(study(flags), solver::InputError);
 }
 
-TEST(StudyFlags, AskForErrorsOfPointsAndOfFiles) {
+TEST(StudyFlags, RequestEstimatedErrorsForFlagsAndForFiles) {
   StudyFlags flags;
   flags.points = flags_of({});
-  const auto without = study_of_flags(flags, pretended_reach());
+  const auto without = study_of_flags(flags, fake_reach());
   flags.errors = true;
-  const auto with = study_of_flags(flags, pretended_reach());
+  const auto with = study_of_flags(flags, fake_reach());
   EXPECT_FALSE(without.recipe.errors());
   EXPECT_TRUE(with.recipe.errors());
-  EXPECT_NE(with.name, without.name) << "another study";
+  EXPECT_NE(with.name, without.name) << "a study with errors is a different study";
   flags.points = {};
   flags.file = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/paper.toml";
-  EXPECT_TRUE(study_of_flags(flags, pretended_reach()).recipe.errors());
+  EXPECT_TRUE(study_of_flags(flags, fake_reach()).recipe.errors());
 }
 
 }  // namespace

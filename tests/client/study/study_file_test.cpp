@@ -30,7 +30,7 @@ TEST(StudyFile, MultipliesAxesInsideABlockWithHSlowestAndEFastest) {
   EXPECT_EQ(table.point(4).H_m, 1.0);
 }
 
-TEST(StudyFile, RequestsErrorsByAKey) {
+TEST(StudyFile, TheKeyErrorsRequestsEstimatedErrors) {
   const auto asks = [](const std::string& head) {
     return protocol::PointTable(parsed(head + block_with("mu = 0.4")).recipe).wants_errors();
   };
@@ -86,14 +86,14 @@ TEST(StudyFile, WithoutANameIsNamedAfterTheFile) {
 /// Returns the error message of reading a study file, or "accepted".
 std::string error_of_file(const std::string& path) {
   try {
-    read_study_file(path, pretended_reach());
+    read_study_file(path, fake_reach());
     return "accepted";
   } catch (const solver::InputError& error) {
     return error.what();
   }
 }
 
-TEST(StudyFile, IsNamedIfItCannotBeRead) {
+TEST(StudyFile, AnUnreadableFileIsNamed) {
   const test::TemporaryFolder folder;
   const std::string empty = folder.file("empty.toml");
   { const std::ofstream file(empty); }
@@ -106,9 +106,9 @@ TEST(StudyFile, IsNamedIfItCannotBeRead) {
 }
 
 /// A folder with the CSV file to which study files refer.
-class StudyBesideAFile : public testing::Test {
+class StudyWithCsvFile : public testing::Test {
  protected:
-  StudyBesideAFile() {
+  StudyWithCsvFile() {
     std::ofstream(folder_.file("measured.csv")) << "drop,friction,H\n0.5,0.4,0.7\n0.5,0.6,0.8\n";
   }
   protocol::PointTable table(const std::string& text) const {
@@ -126,27 +126,27 @@ class StudyBesideAFile : public testing::Test {
   const test::TemporaryFolder folder_;
 };
 
-TEST_F(StudyBesideAFile, TakesAColumnAsAnAxis) {
+TEST_F(StudyWithCsvFile, ACsvColumnBecomesAnAxis) {
   const auto points = table(block_with("mu = { csv = 'measured.csv', column = 'friction' }"));
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points.point(1).mu, 0.6);
   EXPECT_EQ(table("[[block]]\nH = { csv = 'measured.csv' }\nmu = 1\ne = 1\n").point(0).H_m, 0.7)
-      << "the column that is called as the key";
+      << "the default is the column with the name of the key";
 }
 
-TEST_F(StudyBesideAFile, TakesTheLinesAsPoints) {
+TEST_F(StudyWithCsvFile, CsvLinesBecomePoints) {
   const auto points = table(
       "[[block]]\ncsv = 'measured.csv'\ncolumns = { H = 'drop', mu = 'friction' }\ne = 0.9\n");
   ASSERT_EQ(points.size(), 2U);
   EXPECT_EQ(points.point(0).H_m, 0.5);
-  EXPECT_EQ(points.point(1).H_m, 0.5) << "a value may come twice";
+  EXPECT_EQ(points.point(1).H_m, 0.5) << "a value may be repeated";
   EXPECT_EQ(points.point(1).mu, 0.6);
   EXPECT_EQ(points.point(1).e_star, 0.9);
 }
 
-TEST_F(StudyBesideAFile, NamesThePlaceInBothFiles) {
-  const auto expect = [&](const std::string& text, const std::vector<std::string>& says) {
-    for (const auto& part : says) {
+TEST_F(StudyWithCsvFile, AnErrorNamesThePlaceInStudyAndCsvFile) {
+  const auto expect = [&](const std::string& text, const std::vector<std::string>& expected) {
+    for (const auto& part : expected) {
       EXPECT_THAT(error(text), testing::HasSubstr(part));
     }
   };
@@ -198,7 +198,7 @@ TEST(StudyFile, TakesExpressionsFiltersAndSingleLengths) {
 TEST(ExampleStudies, HaveTheNumberOfPointsInTheirComments) {
   const std::string folder = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
   const auto points = [&](const std::string& name) {
-    const auto study = read_study_file(folder + name + ".toml", pretended_reach());
+    const auto study = read_study_file(folder + name + ".toml", fake_reach());
     EXPECT_EQ(study.name, name);
     const protocol::PointTable table(study.recipe);
     EXPECT_NO_THROW(table.validate_points());
@@ -217,7 +217,7 @@ TEST(StudyFile, NamesThePlaceOfWrongValuesThatDependOnThePoint) {
   const struct {
     std::string text;
     const char* key;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {block_with("mu = 'log(-1)'"), "mu", "study.toml:3:6: point 0: mu = nan is not allowed"},
       {block_with("mu = '-1'"), "mu", "study.toml:3:6: point 0: mu = -1 is not allowed"},
@@ -226,13 +226,13 @@ TEST(StudyFile, NamesThePlaceOfWrongValuesThatDependOnThePoint) {
       {kPoint + "[[block]]\nH = 1\nmu = [0.4, 0.5]\ne = 1\nI = 'log(-mu)'\n", "I",
        "study.toml:9:5: block 2: point 1: I = nan"},
   };
-  for (const auto& [text, key, says] : wrong) {
+  for (const auto& [text, key, expected] : wrong) {
     try {
       check_points(parsed(text, "study.toml"));
       ADD_FAILURE() << text;
     } catch (const solver::InputError& error) {
       EXPECT_EQ(error.fields().key, key);
-      EXPECT_THAT(error.what(), testing::StartsWith(says));
+      EXPECT_THAT(error.what(), testing::StartsWith(expected));
     }
   }
   EXPECT_NO_THROW(check_points(parsed(kPoint)));

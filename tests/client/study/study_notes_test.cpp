@@ -40,7 +40,7 @@ TEST(MeshNote, IsForTheCoarsestMeshBelowEightElements) {
   const struct {
     const char* model;
     const char* axis;
-    const char* says;  // empty: no note
+    const char* expected;  // empty: no note
   } cases[] = {
       {"", "", ""},
       {"preset = 'converged'", "", ""},
@@ -51,10 +51,10 @@ TEST(MeshNote, IsForTheCoarsestMeshBelowEightElements) {
       {"", "elements_per_link = [16, 4]\n", "Note: 4 elements"},
       {"", "elements_per_link = {from = 2, to = 16, step = 2}\n", "Note: 2 elements"},
   };
-  for (const auto& [model, axis, says] : cases) {
+  for (const auto& [model, axis, expected] : cases) {
     const auto note = mesh_note(model, axis);
-    EXPECT_EQ(note.empty(), *says == '\0') << note;
-    EXPECT_NE(note.find(says), std::string::npos) << note;
+    EXPECT_EQ(note.empty(), *expected == '\0') << note;
+    EXPECT_NE(note.find(expected), std::string::npos) << note;
   }
 }
 
@@ -84,7 +84,7 @@ TEST(ValueNotes, ReportThatARangeOfASampleIsAListOfValues) {
   EXPECT_EQ(value_notes("", kSample + "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"
                                       "elements_per_link = { from = 4, to = 8, count = 5 }\n"),
             "Note: mu takes 5 values; 0.1:1 draws any value between them.\n")
-      << "numbers of elements are drawn from a list alone";
+      << "numbers of elements can only be drawn from a list";
   EXPECT_EQ(value_notes("", "H = 0.9\nmu = { from = 0.1, to = 1, count = 5 }\ne = 1\n"), "");
 }
 

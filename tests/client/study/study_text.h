@@ -3,7 +3,7 @@
 #include <string>
 
 #include "client/study/study_file.h"
-#include "tests/client/study/pretended_fall.h"
+#include "tests/client/study/fake_reach.h"
 
 namespace oblique::client {
 
@@ -20,7 +20,7 @@ inline std::string block_with(const std::string& line) {
 
 /// Parses the text of a study file. Falls are not solved but invented.
 inline Study parsed(const std::string& text, const std::string& file = "x.toml") {
-  return parse_study(text, file, pretended_reach());
+  return parse_study(text, file, fake_reach());
 }
 
 }  // namespace oblique::client

@@ -131,7 +131,7 @@ class DrawnRecipe {
   std::mt19937 random_;
 };
 
-TEST(StudyToml, ReadsBackAsTheSameRecipeOfEveryKind) {
+TEST(StudyToml, ReadsBackAsTheSameRecipe) {
   for (unsigned seed = 0; seed < 500; ++seed) {
     const auto recipe = DrawnRecipe(seed).recipe();
     ASSERT_NO_THROW(protocol::PointTable{recipe}) << recipe.DebugString();
@@ -146,7 +146,7 @@ std::string written(const std::string& text, const std::string& name = "x") {
   return study_toml(name, parse_study(text, "x.toml", no_reach_check).recipe);
 }
 
-TEST(StudyToml, IsWrittenAsByAPerson) {
+TEST(StudyToml, LooksLikeAHandWrittenFile) {
   EXPECT_EQ(written("[[block]]\nH=1\nmu={from=0.1,to=2,step=0.1}\ne=[0.5,1]\n", "friction"),
             "name = \"friction\"\n\n[model]\npreset = \"standard\"\n\n[[block]]\nH = 1\nmu = { "
             "from = 0.1, to = 2, count = 20 }\n"

@@ -11,22 +11,22 @@ namespace oblique::client {
 namespace {
 
 struct Wrong {
-  std::string text;   // a whole file, lines of [model], or a line of a block
-  std::string place;  // line and column
-  std::string says;   // part of the error message
+  std::string text;      // a whole file, lines of [model], or a line of a block
+  std::string place;     // line and column
+  std::string expected;  // part of the error message
 };
 
 /// `whole` turns the text of a case into a complete study file.
 template <typename Whole>
 void expect_refused(const std::vector<Wrong>& cases, Whole whole) {
-  for (const auto& [text, place, says] : cases) {
+  for (const auto& [text, place, expected] : cases) {
     SCOPED_TRACE(text.substr(0, 100));
     try {
       parsed(whole(text), "study.toml");
-      ADD_FAILURE() << "accepted";
+      ADD_FAILURE() << "the invalid study file was accepted";
     } catch (const solver::InputError& error) {
       EXPECT_EQ(error.fields().place, "study.toml" + (place.empty() ? "" : ":" + place));
-      EXPECT_THAT(error.what(), testing::HasSubstr(says));
+      EXPECT_THAT(error.what(), testing::HasSubstr(expected));
     }
   }
 }

@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-TEST(TracedFall, IsMovedOutOfTheTraceBeforeTheContact) {
+TEST(TakeFall, MovesTheRowsOfTheFallOutOfATrace) {
   const auto taken = [](std::size_t falling, std::size_t touching) {
     std::vector<solver::TraceRow> rows(falling + touching);
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -34,7 +34,7 @@ TEST(TracedFall, IsMovedOutOfTheTraceBeforeTheContact) {
 TEST(TraceOutput, NamesTheFlagOfAFileThatCannotBeWritten) {
   try {
     const TraceOutput output("/nowhere/t.csv", Format::kCsv, "--trace");
-    ADD_FAILURE() << "it is taken";
+    ADD_FAILURE() << "an unwritable file was accepted";
   } catch (const solver::InputError& error) {
     EXPECT_EQ(std::string(error.what()),
               "--trace /nowhere/t.csv cannot be written: No such file or directory");

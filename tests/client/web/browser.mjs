@@ -42,9 +42,9 @@ export class Server {
   }
 }
 
-/** A browser that adds every error of its pages to `objections`. */
+/** A browser that adds every error of its pages to `errors`. */
 export class Browser {
-  objections = [];
+  errors = [];
 
   async start(server) {
     this.server = server;
@@ -73,20 +73,20 @@ export class Browser {
   async open(view, { isHurried = false, expected = /^$/, early = () => {}, ...look } = {}) {
     const page = await this.#tab();
     await this.look(page, look);
-    const object = (text) => this.objections.push(`${view}: ${text}`);
+    const addError = (text) => this.errors.push(`${view}: ${text}`);
     page.on("console", (line) => {
       const isBad = ["error", "warn"].includes(line.type()) && !expected.test(line.text());
-      if (isBad) object(`console: ${line.text()}`);
+      if (isBad) addError(`console: ${line.text()}`);
     });
-    page.on("pageerror", (error) => object(error.stack));
+    page.on("pageerror", (error) => addError(error.stack));
     page.on("request", (request) => {
       const url = request.url();
-      if (!/^(data|blob):/.test(url) && new URL(url).origin !== this.server.origin) object(url);
+      if (!/^(data|blob):/.test(url) && new URL(url).origin !== this.server.origin) addError(url);
     });
-    await page.exposeFunction("objected", object);
+    await page.exposeFunction("reportViolation", addError);
     await page.evaluateOnNewDocument((hurried) => {
       document.addEventListener("securitypolicyviolation", ({ violatedDirective, blockedURI }) =>
-        window.objected(`policy: ${violatedDirective} ${blockedURI}`),
+        window.reportViolation(`policy: ${violatedDirective} ${blockedURI}`),
       );
       const real = window.setTimeout;
       if (!hurried) return;
@@ -129,5 +129,5 @@ export async function until(page, look, ...given) {
     if (found) return found;
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
-  throw new Error(`it did not come to: ${look}`, { cause });
+  throw new Error(`timeout while waiting for: ${look}`, { cause });
 }

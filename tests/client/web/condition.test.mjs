@@ -13,12 +13,12 @@ const hasSelected = (page, condition) =>
     condition,
   );
 
-test("cells that do not meet the filter are greyed and counted, and the filter is in table, address and commands", async () => {
+test("cells outside the filter are grey and counted, and table, address and commands contain the filter", async () => {
   const page = await web.study("#/study/1?at=e@2");
   const before = await imageOf(page);
   await web.write(page, web.whereField, "mu > 1 AND e = 1");
   await web.shows(page, ".gaps", /42 cells filtered out/);
-  await web.rowsSaid(page, /of 42 rows/);
+  await web.showsRowCount(page, /of 42 rows/);
   assert.notEqual(await imageOf(page), before);
   assert.equal(await web.fieldOf(page, "where"), "mu > 1 AND e = 1");
   assert.match(await web.textOf(page, ".commands code"), /--where 'mu > 1 AND e = 1'/);
@@ -33,14 +33,14 @@ test("errors in a condition appear beside its field", async () => {
   await web.shows(page, "#said-where", /did you mean `mu`\?/);
   assert.equal(await page.$eval(web.whereField, (one) => one.getAttribute("aria-invalid")), "true");
   await web.write(page, web.whereField, "");
-  await web.rowsSaid(page, /of 252 rows/);
+  await web.showsRowCount(page, /of 252 rows/);
   await web.write(page, web.markField, "mu >");
   await web.shows(page, "#said-mark", /./);
   assert.equal(await web.textOf(page, "p.said:not([id])"), "");
   await page.close();
 });
 
-test("a rectangle over a map selects its points in table and other pictures; the selection becomes the filter; Back undoes both", async () => {
+test("a rectangle over a map selects its points in the table and in other pictures; the selection can become the filter; Back undoes both", async () => {
   const page = await web.study("#/study/1?at=e@2&drag=select");
   const before = await imageOf(page);
   await web.drag(page, web.mapCanvas, [0.3, 0.3], [0.6, 0.9]);
@@ -52,7 +52,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   await hasSelected(page, condition);
   assert.notEqual(await imageOf(page), before);
   const [[selected]] = await web.rowsOf(page, 1, { select: "count(*)", where: condition });
-  await web.rowsSaid(page, new RegExp(`of ${selected} rows`));
+  await web.showsRowCount(page, new RegExp(`of ${selected} rows`));
   await page.select(".controls select", "histogram");
   await web.shows(page, ".lines .legend", /selected/);
   await web.press(page, "Use selection as filter");
@@ -62,7 +62,7 @@ test("a rectangle over a map selects its points in table and other pictures; the
   assert.equal(await valueOf(page, web.markField), condition);
   assert.equal(await page.$eval(web.whereField, (one) => one.value), "");
   await web.press(page, "Clear");
-  await web.rowsSaid(page, /of 252 rows/);
+  await web.showsRowCount(page, /of 252 rows/);
   await page.close();
 });
 
@@ -90,7 +90,7 @@ test("Escape clears the selection, and Shift makes dragging select instead of zo
   }
 });
 
-test("lines show a selection made elsewhere, and keys read their values", async () => {
+test("lines show a selection made in another picture, and keys read their values", async () => {
   const page = await web.study("#/study/1?pic=lines&x=mu&y=H&at=e@2&mark=fn_peak_N>4000");
   await hasSelected(page, "fn_peak_N>4000");
   await page.focus(".plot[role=application]");
@@ -106,7 +106,7 @@ test("lines show a selection made elsewhere, and keys read their values", async 
   await page.close();
 });
 
-test("few points are drawn one by one, and chosen by pointing at them; many are grouped in bins, and the page says so", async () => {
+test("few points are drawn one by one and can be clicked; many are grouped in bins, and the page says so", async () => {
   const page = await web.study(`#/study/${web.studies.scattered}?x=mu&y=fn_peak_N&z=H`);
   await web.facts(page, /^300 points, drawn one by one/);
   const id = web.studies.scattered;

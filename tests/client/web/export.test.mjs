@@ -26,7 +26,7 @@ const views = [
   [`${web.studies.one}`, "point,mu,H,fn_peak_N", 2],
 ];
 
-test("each kind of view has a command that draws it, a CSV of its numbers, and a PNG with its legend", async () => {
+test("each kind of view offers a command that draws it, a CSV of its numbers, and a PNG with its legend", async () => {
   for (const [view, head, lines] of views) {
     const page = await web.study(`#/study/${view}`, { early: web.keepSaved });
     const out = join(web.server.folder, "command.csv");
@@ -70,7 +70,7 @@ test("the CSV of the table equals the output of its command", async () => {
   await page.close();
 });
 
-test("Refine submits the shown part of a map as a new study and shows it as it is solved", async () => {
+test("Refine submits the shown part of a map as a new study and shows its progress", async () => {
   const view = "#/study/1?pic=map&z=slide_m&x=mu&y=H&at=e@1&x0=2&x1=4&y0=1&y1=3&from=0&to=1";
   const page = await web.study(view, { expected: /status of 409/ });
   assert.equal(await web.textOf(page, ".refine"), "Refine to 65 × 65 points");

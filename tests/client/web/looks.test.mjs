@@ -26,7 +26,7 @@ const views = {
   nothing: ["#/study/999", "[role=alert]"],
 };
 
-test("axe-core finds nothing wrong with any view, light or dark, and nothing is wider than a window of 400 or 1400 pixels", async () => {
+test("axe-core finds no fault in any view, light or dark, and nothing is wider than a window of 400 or 1400 pixels", async () => {
   const folder = process.env.OBLIQUE_SCREENSHOTS;
   if (folder) mkdirSync(folder, { recursive: true });
   const faults = [];
@@ -58,7 +58,7 @@ test("in a window of 1400 x 900 pixels a map and its legend are visible without 
   }
 });
 
-test("a point's time histories and numbers fit two screens of 1400 x 900 pixels, forces first and the finger beside them", async () => {
+test("a point's time histories and numbers fit two screens of 1400 x 900 pixels, with the forces first and the finger beside them", async () => {
   const page = await web.point();
   const [forces, tip] = await page.$$eval("figure", (all) =>
     all.map((one) => one.getBoundingClientRect().toJSON()),

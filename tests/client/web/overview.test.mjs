@@ -24,13 +24,13 @@ async function fill(page, values) {
   }
 }
 
-const says = (page, pattern) => web.shows(page, "form [role=status]", pattern);
+const showsStatus = (page, pattern) => web.shows(page, "form [role=status]", pattern);
 const isOff = (page) => page.$eval("form button", (one) => one.disabled);
 
-test("the overview follows a study that is submitted on the page, live, and studies are paused, resumed and cancelled", async () => {
+test("the overview shows the progress of a study submitted on the page, which can be paused, resumed and cancelled", async () => {
   const page = await form();
   await fill(page, { name: "live", H: "0.2:1.1:200", mu: "0.1:2:200", e: "0.5:1:50" });
-  await says(page, /^2\u202f000\u202f000 points, 1 model/);
+  await showsStatus(page, /^2\u202f000\u202f000 points, 1 model/);
   await page.click("form button");
   await web.until(page, () => /^#\/study\/\d/.test(location.hash));
   await web.goTo(page, "#/");
@@ -50,7 +50,7 @@ test("the overview follows a study that is submitted on the page, live, and stud
   await page.close();
 });
 
-test("a form with an error shows what is allowed and cannot be submitted", async () => {
+test("a form with an invalid value shows the allowed values and cannot be submitted", async () => {
   const page = await form();
   for (const [values, sentence] of [
     [{ mu: "0.1:2" }, /FROM:TO:COUNT/],
@@ -60,7 +60,7 @@ test("a form with an error shows what is allowed and cannot be submitted", async
     [{ H: "1", sample: "some:10" }, /kinds are random, lhs, sobol/],
   ]) {
     await fill(page, values);
-    await says(page, sentence);
+    await showsStatus(page, sentence);
     assert.equal(await isOff(page), true, String(sentence));
   }
   await page.close();
@@ -68,9 +68,9 @@ test("a form with an error shows what is allowed and cannot be submitted", async
 
 test("the form shows points, models, falls and size, and the errors of the server", async () => {
   const page = await form();
-  await says(page, /^40 points, 1 model with 1 fall, about 39 kB in the database\.$/);
+  await showsStatus(page, /^40 points, 1 model with 1 fall, about 39 kB in the database\.$/);
   await page.type("form textarea", "rho=2600:2700:3\nk=1e7:3e7:5");
-  await says(
+  await showsStatus(
     page,
     /^600 points, 15 models with 3 different falls, about 591 kB in the database\.$/,
   );
@@ -81,9 +81,9 @@ test("the form shows points, models, falls and size, and the errors of the serve
   const bare = commands.map((one) => one.replace(/ --db \S+$/, ""));
   assert.deepEqual(bare, [`oblique run ${flags}`, `oblique study check ${flags}`]);
   await fill(page, { H: "0.5:1.19:4" });
-  await says(page, /H above 1\.08 m fail if the tip does not fall that far/);
+  await showsStatus(page, /H above 1\.08 m fail if the tip does not fall that far/);
   await fill(page, { name: "friction", H: "1" }); // a study of this name with other points exists
-  await says(page, /different falls/);
+  await showsStatus(page, /different falls/);
   await page.click("form button");
   await web.shows(page, "form [role=alert]", /friction/);
   await page.close();
@@ -101,7 +101,7 @@ test("the command of a form submits the same study as the form: model and sample
   };
   await fill(page, values);
   await page.select("form select", "printed");
-  await says(page, /^1\d points,/);
+  await showsStatus(page, /^1\d points,/);
   const words = web.wordsOf(await web.textOf(page, ".copied code"));
   await page.click("form button");
   await web.shows(page, ".standing", /^done/);
@@ -147,14 +147,14 @@ function manyStudies() {
   };
   window.send = (changes) => {
     const none = { unlisted: 0, workers_there: 0, threads: 0, points_open: 0, points_per_s: 0 };
-    const told = { studies: [], studies_by_state: {}, workers: [], ...none, ...changes };
-    window.stream.dispatchEvent(new MessageEvent("overview", { data: JSON.stringify(told) }));
+    const overview = { studies: [], studies_by_state: {}, workers: [], ...none, ...changes };
+    window.stream.dispatchEvent(new MessageEvent("overview", { data: JSON.stringify(overview) }));
   };
 }
 
 const names = (page) => page.$$eval("tbody th", (all) => all.map((one) => one.textContent));
 
-test("of many studies the newest are shown, others are found by name, and changed ones are read again", async () => {
+test("the overview shows the newest of many studies, finds others by name, and updates changed studies", async () => {
   const how = { early: manyStudies, isHurried: true, expected: /status of 503/ };
   const page = await web.browser.open("#/", how);
   await web.until(page, () => document.querySelectorAll("tbody tr").length === 200);

@@ -10,22 +10,22 @@ const finger = (page) => page.$eval(".two canvas[role=img]", (canvas) => canvas.
 function framesByHand() {
   let now = 0;
   let next = 0;
-  const asked = new Map();
+  const frames = new Map();
   performance.now = () => now;
-  window.requestAnimationFrame = (draw) => asked.set(++next, draw) && next;
-  window.cancelAnimationFrame = (which) => asked.delete(which);
+  window.requestAnimationFrame = (draw) => frames.set(++next, draw) && next;
+  window.cancelAnimationFrame = (which) => frames.delete(which);
   window.goOn = (seconds) => {
     for (const end = now + seconds * 1000; now < end;) {
       now += 50;
-      const due = [...asked.values()];
-      asked.clear();
+      const due = [...frames.values()];
+      frames.clear();
       for (const draw of due) draw(now);
     }
   };
 }
 const goOn = (page, seconds) => page.evaluate((long) => window.goOn(long), seconds);
 
-test("the contact plays by itself, is paused, and plays only when asked for readers who prefer little motion", async () => {
+test("the contact plays automatically and can be paused; with reduced motion it plays only on request", async () => {
   const page = await web.point({ motion: "no-preference", early: framesByHand });
   await goOn(page, 1);
   const playing = parseFloat(await time(page));
@@ -92,10 +92,10 @@ test("a refused trace is requested again, and the page shows the reason", async 
     early: () => {
       const real = window.fetch;
       let refused = 0;
-      window.told = [];
+      window.shown = [];
       window.fetch = async (path, how) => {
         if (!/\/trace\?/.test(path)) return real(path, how);
-        window.told.push(document.querySelector("[aria-label='Time histories'] .said").textContent);
+        window.shown.push(document.querySelector("[aria-label='Time histories'] .said").textContent);
         const status = [409, 503][refused++];
         const error = () => new Response('{"error":"too many wait"}', { status });
         return status ? error() : real(path, how);
@@ -103,12 +103,12 @@ test("a refused trace is requested again, and the page shows the reason", async 
     },
   });
   await web.until(page, () => document.querySelectorAll(".uplot").length === 4);
-  const told = await page.evaluate(() => window.told.slice(1));
-  assert.deepEqual(told, Array(2).fill("No time histories yet: too many wait. Trying again."));
+  const shown = await page.evaluate(() => window.shown.slice(1));
+  assert.deepEqual(shown, Array(2).fill("No time histories yet: too many wait. Trying again."));
   await page.close();
 });
 
-test("a point that is solved while it is shown gets its numbers", async () => {
+test("a point that is solved while its page is open shows its numbers", async () => {
   const page = await web.browser.open("#/", {
     early: () => {
       const real = window.fetch;

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-test("a running study keeps the button that has the focus, its plot and the cursor there, and its commands", async () => {
+test("updates of a running study keep the focused button, the plot with its cursor, and the commands", async () => {
   const page = await web.browser.open("#/", { isHurried: true });
   const id = await web.submit(page, "looked at", web.longAxes);
   await web.goTo(page, `#/study/${id}?pic=histogram&x=mu`);
@@ -28,7 +28,7 @@ test("a running study keeps the button that has the focus, its plot and the curs
   await page.close();
 });
 
-test("points that were solved while a study was opened are shown", async () => {
+test("points that are solved while a study is loading are shown", async () => {
   const page = await web.browser.open("#/study/1", {
     early: () => {
       const real = window.fetch;
@@ -45,6 +45,6 @@ test("points that were solved while a study was opened are shown", async () => {
     },
   });
   await web.until(page, () => document.querySelectorAll(".rows tbody tr").length === 25);
-  await web.rowsSaid(page, /of 252 rows/);
+  await web.showsRowCount(page, /of 252 rows/);
   await page.close();
 });

@@ -31,7 +31,7 @@ before(async () => {
 after(async () => {
   await browser.stop();
   await server.stop();
-  assert.deepEqual(browser.objections, [], "errors, policy reports or requests to other hosts");
+  assert.deepEqual(browser.errors, [], "errors, policy reports or requests to other hosts");
 });
 
 export const textOf = (page, selector) => page.$eval(selector, (one) => one.textContent);
@@ -47,7 +47,7 @@ export const shows = (page, selector, pattern) =>
 
 export const facts = (page, pattern) => shows(page, ".facts", pattern);
 /** Waits until the line with the table's number of rows matches `pattern`. */
-export const rowsSaid = (page, pattern) => shows(page, ".rows p[role=status]", pattern);
+export const showsRowCount = (page, pattern) => shows(page, ".rows p[role=status]", pattern);
 export const fieldOf = (page, name) =>
   page.evaluate((of) => new URLSearchParams(location.hash.split("?")[1]).get(of) ?? "", name);
 
@@ -55,7 +55,7 @@ export const fieldOf = (page, name) =>
 export async function study(view = "#/study/1", how = {}) {
   const page = await browser.open(view, how);
   await facts(page, /solved|points?[ ,]/);
-  await rowsSaid(page, /rows/);
+  await showsRowCount(page, /rows/);
   return page;
 }
 

@@ -14,16 +14,16 @@ const optionsOf = (page, label) =>
   );
 const plotCommand = (page) => web.textOf(page, ".commands code");
 
-test("a map shows the value of a cell; a click chooses it, a double click opens its point, and Back keeps it chosen", async () => {
+test("a map shows the value of a cell; a click chooses the cell, a double click opens its point, and Back keeps the choice", async () => {
   const page = await web.study("#/study/1");
   await web.facts(page, /12 × 7 cells, 84 solved/);
   const box = await (await page.$(web.mapCanvas)).boundingBox();
   const first = [box.x + 75, box.y + box.height - 60]; // a cell at the bottom left
   await page.mouse.move(...first);
   await web.shows(page, ".reading", /mu 0.1, H 0.5 m: fn_peak_N [\d.]+ N/);
-  const told = Number((await web.textOf(page, ".reading")).match(/fn_peak_N ([\d.]+)/)[1]);
+  const shown = Number((await web.textOf(page, ".reading")).match(/fn_peak_N ([\d.]+)/)[1]);
   const [[stored]] = await web.rowsOf(page, 1, { select: "fn_peak_N", where: "point = 0" });
-  assert.ok(Math.abs(told / stored - 1) < 1e-4, `${told} ${stored}`);
+  assert.ok(Math.abs(shown / stored - 1) < 1e-4, `${shown} ${stored}`);
   await page.mouse.click(...first);
   assert.equal(await web.textOf(page, ".choice a"), "Open point 0");
   assert.equal(await page.$eval("tr.chosen", (row) => row.dataset.point), "0");
@@ -34,7 +34,7 @@ test("a map shows the value of a cell; a click chooses it, a double click opens 
   await page.close();
 });
 
-test("keys move over a map, its values are spoken, Enter opens the point, and Back leaves the focus free", async () => {
+test("keys move over a map and zoom it, a live region announces its values, Enter opens the point, and Back undoes the zoom", async () => {
   const page = await web.study("#/study/1");
   await page.focus(web.mapCanvas);
   for (const key of ["ArrowRight", "ArrowRight", "ArrowUp"]) await page.keyboard.press(key);
@@ -77,7 +77,7 @@ test("tables, maps and lines have the units of the tables of oblique, and the ta
   const page = await web.study(
     "#/study/1?pic=map&z=duration_s&x=mu&y=H&at=e@2&x0=2&x1=4&y0=1&y1=3",
   );
-  await web.rowsSaid(page, /of 27 rows/);
+  await web.showsRowCount(page, /of 27 rows/);
   const heads = await page.$$eval(".rows thead th", (all) => all.map((one) => one.textContent));
   const expected =
     "point,H [m],mu,e,duration_s [µs],fn_peak_N,ft_peak_N,slide_m [mm],stick_total_s [µs],major_mode";
@@ -92,7 +92,7 @@ test("tables, maps and lines have the units of the tables of oblique, and the ta
   await page.close();
 });
 
-test("a mode keeps its colour while the page is open: zoomed, of another value, as points", async () => {
+test("a mode keeps its colour while the page is open: when zoomed, for another slider value, and as points", async () => {
   const page = await web.study("#/study/1?pic=map&z=major_mode&x=mu&y=H&at=e@2");
   const looks = () =>
     page.$$eval(".categories li", (all) => {
@@ -115,7 +115,7 @@ test("a mode keeps its colour while the page is open: zoomed, of another value, 
   await page.close();
 });
 
-test("a sample is drawn as points; their lines are medians and quartiles; its histogram is of an output and begins at 0", async () => {
+test("a sample is drawn as points, its lines are medians and quartiles, and its histogram shows an output and begins at 0", async () => {
   const page = await web.study(`#/study/${web.studies.scattered}`, {
     early: () => {
       const { prototype } = CanvasRenderingContext2D;
@@ -138,7 +138,7 @@ test("a sample is drawn as points; their lines are medians and quartiles; its hi
   await page.close();
 });
 
-test("zooming by mouse is a step that Back undoes, also of lines, bars and logarithmic axes, and is in address and command", async () => {
+test("zooming by mouse changes address and command, Back undoes it, also on lines, bars and logarithmic axes", async () => {
   const range = String.raw`[\d.]+ AND \w+ <= [\d.]+`;
   const commands = {
     "1?pic=map&x=mu&y=H": `--where 'mu >= ${range} AND H >= ${range}'`,
@@ -163,7 +163,7 @@ test("zooming by mouse is a step that Back undoes, also of lines, bars and logar
   }
 });
 
-test("a slider shows other values, and writes the address a few times, however fast it is moved", async () => {
+test("a slider shows other values and writes the address only a few times however fast it moves", async () => {
   const page = await web.study("#/study/1?pic=map&z=mode&x=mu&y=H&at=e@2");
   assert.match(
     await plotCommand(page),
@@ -190,14 +190,14 @@ test("a slider shows other values, and writes the address a few times, however f
   await page.close();
 });
 
-test("rows are turned a page at a time and sorted, by keys too, and the page is part of the address", async () => {
+test("rows are paged and sorted, also by keyboard, and the address contains the page", async () => {
   const page = await web.study("#/study/1");
-  await web.rowsSaid(page, /^1 to 25 of 252 rows\.$/);
+  await web.showsRowCount(page, /^1 to 25 of 252 rows\.$/);
   await web.press(page, "Next");
-  await web.rowsSaid(page, /^26 to 50 of 252 rows\.$/);
+  await web.showsRowCount(page, /^26 to 50 of 252 rows\.$/);
   await web.until(page, () => location.hash.includes("page=2"));
   await web.write(page, web.whereField, "mu > 1"); // a new filter returns to the first page
-  await web.rowsSaid(page, /^1 to 25 of 126 rows/);
+  await web.showsRowCount(page, /^1 to 25 of 126 rows/);
   await page.evaluate(() =>
     [...document.querySelectorAll("th button")].find((one) => one.textContent === "mu").focus(),
   );
@@ -206,7 +206,7 @@ test("rows are turned a page at a time and sorted, by keys too, and the page is 
     await web.shows(page, `.rows th[aria-sort=${order}]`, /^mu/);
     assert.match(await page.evaluate(() => document.activeElement.textContent), /^mu/);
   }
-  await web.rowsSaid(page, /^1 to 25/);
+  await web.showsRowCount(page, /^1 to 25/);
   await page.close();
 });
 
@@ -250,7 +250,7 @@ test("unsuitable addresses show the default view", async () => {
   await page.close();
 });
 
-test("a map shows one block of a study, says so, and another one is chosen", async () => {
+test("a map shows one block of a study and says so, and another block can be chosen", async () => {
   const page = await web.browser.open("#/");
   const axes = [
     { key: "H", values: [0.5, 1] },
@@ -272,7 +272,7 @@ test("a map shows one block of a study, says so, and another one is chosen", asy
   await page.close();
 });
 
-test("colours span a given end, in shown units, and the other end of the data", async () => {
+test("the colour scale spans from a typed end, in the shown unit, to the other end of the data", async () => {
   const page = await web.study("#/study/1?z=slide_m&from=0.0002");
   assert.match(await plotCommand(page), /--range 0\.0002:0\.00\d+/);
   const from = "input[inputmode=decimal]";
@@ -292,7 +292,7 @@ test("a study with failed points shows their number and the reason, and lists th
   const why = /^Point 8 failed: H = 1\.19 m is not allowed.* 1\.179\d* m.*Show all 4$/;
   await web.shows(page, ".failure", why);
   await page.click(".failure a");
-  await web.rowsSaid(page, /^1 to 4 of 4 rows/);
+  await web.showsRowCount(page, /^1 to 4 of 4 rows/);
   assert.equal(await web.fieldOf(page, "where"), "error IS NOT NULL");
   assert.match(await web.textOf(page, ".rows thead"), /statuserror/);
   await page.close();
@@ -316,7 +316,7 @@ test("a server that does not answer is reported, and requests to it are repeated
   await page.close();
 });
 
-test("a picture that is no longer wanted does not hold up the next, and a large map comes coarse first", async () => {
+test("an outdated picture does not delay the next, and a large map appears coarse first", async () => {
   const page = await web.study("#/study/1?pic=map&z=fn_peak_N&x=mu&y=H", {
     early: () => {
       const real = window.fetch;
@@ -351,7 +351,7 @@ test("a picture that is no longer wanted does not hold up the next, and a large 
 
 test("ticks of infinite, tiny and huge ranges are a few round values", async () => {
   const page = await web.browser.open("#/");
-  const told = await page.evaluate(async () => {
+  const shown = await page.evaluate(async () => {
     const { scale, ticks } = await import("/lib/scale.js");
     const ranges = [
       [0.01, 10, true],
@@ -362,6 +362,6 @@ test("ticks of infinite, tiny and huge ranges are a few round values", async () 
     return ranges.map((ends) => ticks(scale(...ends), 6).join());
   });
   const expected = ["0.01,0.03,0.1,0.3,1,3,10", "3", "1", "0,5e+307,1e+308,1.5e+308"];
-  assert.deepEqual(told, expected);
+  assert.deepEqual(shown, expected);
   await page.close();
 });

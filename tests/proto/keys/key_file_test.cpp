@@ -69,7 +69,7 @@ class KeyFileTest : public ::testing::Test {
   test::TemporaryFolder folder_;
 };
 
-TEST(CurveKeyTest, AreFormattedAsByLibzmq) {
+TEST(CurveKeyTest, KeysAreFormattedAsByLibzmq) {
   const KeyPair pair = generate_key_pair();
   const std::string secret = z85(pair.secret_key.bytes());
   char text[kKeyCharacters + 1];
@@ -81,14 +81,14 @@ TEST(CurveKeyTest, AreFormattedAsByLibzmq) {
   EXPECT_EQ(public_key_of(pair.secret_key), pair.public_key);
 }
 
-TEST(CurveKeyTest, AreNotParsedFromInvalidText) {
+TEST(CurveKeyTest, InvalidTextIsNotParsedAsAKey) {
   const std::string good = z85(generate_key_pair().public_key);
   EXPECT_FALSE(parse_z85(""));
   EXPECT_FALSE(parse_z85(good.substr(1)));
   EXPECT_FALSE(parse_z85(good + "00000"));
   EXPECT_FALSE(parse_z85(good.substr(5) + std::string(5, '\0')));
   EXPECT_FALSE(parse_z85(std::string(40, '"')));
-  EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "more than 32 bits in five digits";
+  EXPECT_FALSE(parse_z85(std::string(40, '#'))) << "five digits exceed 32 bits";
 }
 
 TEST_F(KeyFileTest, IsReadAsWrittenAndOnlyItsOwnerMayReadIt) {
@@ -184,7 +184,7 @@ void expect_no_copy_in_a_core_dump(const SecretKey& key) {
 
 TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   if (!test::kAllMemoryMayBeRead) {
-    GTEST_SKIP() << "a sanitizer objects to reading all memory";
+    GTEST_SKIP() << "the sanitizer does not allow reading all memory";
   }
   const KeyFile made = worker_key();
   write_key_file(folder_.file("made.key"), made);
@@ -289,7 +289,8 @@ TEST_F(AuthorizedKeysTest, KeepsItsModeAndIsRefusedIfEveryUserMayWriteOrReplaceI
   ASSERT_EQ(stat(path_.c_str(), &file), 0);
   EXPECT_EQ(file.st_mode & 07777U, 0640U);
   chmod(folder_.path().c_str(), 01777);
-  EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(2)) << "only owners replace files there";
+  EXPECT_THAT(read_authorized_keys(path_).all(), SizeIs(2))
+      << "in a sticky folder only owners can replace files";
   chmod(folder_.path().c_str(), 0777);
   EXPECT_THAT(error_of(text()),
               AllOf(HasSubstr("chmod o-w"), HasSubstr(folder_.path().string() + " has mode 0777")));
@@ -310,7 +311,7 @@ TEST_F(AuthorizedKeysTest, ErrorsNameTheLineOfAnInvalidOrRepeatedEntry) {
   const AuthorizedKey a = key_called("a");
   AuthorizedKey same_key = a;
   same_key.name = "b";
-  for (const auto& [text, line, says] : std::vector<std::array<std::string, 3>>{
+  for (const auto& [text, line, expected] : std::vector<std::array<std::string, 3>>{
            {entry(a) + entry(key_called("a")), "6", "already has a key called a"},
            {entry(a) + entry(same_key), "6", "already has the public key"},
            {entry(a) + "expires = 3\n", "6", "unknown key `expires`"},
@@ -319,7 +320,7 @@ TEST_F(AuthorizedKeysTest, ErrorsNameTheLineOfAnInvalidOrRepeatedEntry) {
            {"[[keys]]\n", "1", "unknown key `keys`"},
            {"key = 3\n", "1", "[[key]]"}}) {
     EXPECT_THAT(error_of(text),
-                AllOf(HasSubstr("authorized_keys.toml:" + line + ":"), HasSubstr(says)));
+                AllOf(HasSubstr("authorized_keys.toml:" + line + ":"), HasSubstr(expected)));
   }
 }
 

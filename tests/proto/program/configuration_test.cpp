@@ -63,12 +63,12 @@ class ConfigurationTest : public testing::Test {
     for (const std::string& word : words) {
       arguments.push_back(word.c_str());
     }
-    const std::ostringstream told;
-    auto* const before = std::cerr.rdbuf(told.rdbuf());
+    const std::ostringstream printed;
+    auto* const before = std::cerr.rdbuf(printed.rdbuf());
     const auto exit_code =
         configuration.parse(static_cast<int>(arguments.size()), arguments.data());
     std::cerr.rdbuf(before);
-    errors_ = told.str();
+    errors_ = printed.str();
     printed_ = exit_code ? "" : configuration.printed();
     return exit_code;
   }
@@ -100,13 +100,14 @@ TEST_F(ConfigurationTest, FlagsOverrideTheEnvironmentWhichOverridesTheFile) {
   EXPECT_EQ(options_.connections, 5);
   EXPECT_FALSE(options_.loud);
   EXPECT_EQ(options_.listen, (std::vector<std::string>{"127.0.0.1", "::1"}));
-  EXPECT_EQ(options_.keys, "shared.key") << "of several programs";
+  EXPECT_EQ(options_.keys, "shared.key")
+      << "the value comes from the section shared by several programs";
   set("TEST_PROGRAM_KEYS", "own.key");
   set("TEST_PROGRAM_PORT", "");
   set("TEST_PROGRAM_SERVICE_HOST", "10.0.0.1");
   EXPECT_EQ(parse({"--config", file, "--listen", "::2"}), std::nullopt) << errors_;
   EXPECT_EQ(options_.keys, "own.key");
-  EXPECT_EQ(options_.port, 1) << "an empty variable and one of no setting are ignored";
+  EXPECT_EQ(options_.port, 1) << "empty variables and variables of unknown settings are ignored";
   EXPECT_EQ(options_.listen, std::vector<std::string>{"::2"}) << "a flag replaces the list";
 }
 
@@ -185,7 +186,7 @@ TEST_F(ConfigurationTest, AWrongValueIsNamedWithItsPlace) {
   expect_refused({"--port", "80000"}, "program: --port: Value 80000");
 }
 
-TEST_F(ConfigurationTest, QuietIsTheShortFormOfALevel) {
+TEST_F(ConfigurationTest, QuietIsShortForALogLevel) {
   const std::string file = write("[log]\nlevel = \"debug\"\n");
   EXPECT_EQ(parse({"--config", file}), std::nullopt);
   EXPECT_EQ(options_.log.level, "debug");

@@ -105,12 +105,13 @@ std::pair<bool, bool> stops_with(pid_t parent) {
 }
 
 TEST(StopWithParent, TheProcessGetsSigtermWhenItsParentEnds) {
-  EXPECT_EQ(stops_with(0), std::pair(true, false)) << "without the option";
+  EXPECT_EQ(stops_with(0), std::pair(true, false)) << "parent 0 means that the option is not used";
   EXPECT_EQ(stops_with(getpid()), std::pair(true, true));
-  EXPECT_EQ(stops_with(getppid()), std::pair(false, true)) << "it has ended";
+  EXPECT_EQ(stops_with(getppid()), std::pair(false, true))
+      << "the given parent is no longer the parent";
 }
 
-TEST(StopSignals, TheFirstOfSeveralIsTheExitCode) {
+TEST(StopSignals, TheFirstOfSeveralSignalsDeterminesTheExitCode) {
   StopSignals stop;
   EXPECT_FALSE(stop.requested());
   EXPECT_FALSE(stop.wait(1ms));
@@ -132,7 +133,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
   std::signal(SIGHUP, before);
 }
 
-TEST(StopSignals, ItsEndRestoresSignalsAndDropsPendingOnes) {
+TEST(StopSignals, TheDestructorRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
     raise(SIGTERM);  // ends this process below if it is still pending there

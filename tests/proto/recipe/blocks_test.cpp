@@ -187,7 +187,7 @@ TEST(BlockKindsTest, AnExpressionUsesTheLengthSetByLinks) {
   }
 }
 
-TEST(KeysTest, EveryKeyHasItsNumber) {
+TEST(KeysTest, EveryParameterKeyHasItsOwnNumber) {
   for (std::size_t i = 0; i <= key_number("e"); ++i) {
     EXPECT_EQ(key_number(key_numbered(i).name), i);
   }
@@ -242,7 +242,7 @@ TEST(FilterTest, PointsThatAreLeftOutKeepTheirNumbersAndOtherBlocksTheirPoints) 
   EXPECT_FALSE(plain.has_points_to_validate() || plain.has_filter());
 }
 
-TEST(FilterTest, UsesExpressionsTheModelAndPointsOfZipsAndSamples) {
+TEST(FilterTest, AFilterMayUseExpressionsAndModelKeysInZipsAndSamples) {
   EXPECT_THAT(
       left_in(PointTable(recipe_of_blocks({with_k("1e7 * (1 + mu)", 11, "k > 1.85e7 && g > 9")}))),
       ElementsAre(9, 10));
@@ -280,11 +280,12 @@ TEST(ValidatedPointsTest, AValueThatIsNotAllowedIsAnErrorWithPointAndValues) {
   }
 }
 
-TEST(ValidatedPointsTest, OfManyPointsRandomOnesAreValidatedAndOthersFailLater) {
+TEST(ValidatedPointsTest, InALargeStudyRandomPointsAreValidatedAndOthersFailWhenSolved) {
   constexpr std::uint64_t kMany = 100'000'001;
   EXPECT_THAT(fault_of_points(with_k("1e7 * (0.99 - mu)", kMany)), HasSubstr("k = "))
-      << "one in a hundred";
-  EXPECT_EQ(fault_of_points(with_k("1e7", kMany, "mu > 2")), "") << "not all were examined";
+      << "one point in a hundred is invalid";
+  EXPECT_EQ(fault_of_points(with_k("1e7", kMany, "mu > 2")), "")
+      << "a filter that may keep unexamined points is accepted";
   const Block wrong_at_the_end = with_k("if(mu < 1, 1e7, -1)", kMany);
   EXPECT_EQ(fault_of_points(wrong_at_the_end), "");
   const PointTable table(recipe_of_blocks({wrong_at_the_end}));

@@ -35,7 +35,7 @@ double value_of(const std::string& text, const std::vector<double>& values = {})
   return read(text, names).value_at(values);
 }
 
-std::string objection_to(const std::string& text) {
+std::string error_for(const std::string& text) {
   std::vector<std::string> names;
   try {
     read(text, names);
@@ -91,9 +91,9 @@ TEST(ExpressionTest, EveryFunctionTakesItsArgumentsAndNoOthers) {
   EXPECT_EQ(value_of("sqrt(4) + log10(1000) + log2(8) + ln(1) + log(1)"), 8.0);
   for (const std::string_view each : function_names()) {
     const std::string name(each);
-    EXPECT_THAT(objection_to(name + "()"), HasSubstr("and has 0"));
-    EXPECT_THAT(objection_to(name + "(1, 2, 3, 4)"), HasSubstr("and has 4"));
-    EXPECT_THAT(objection_to(name), HasSubstr("brackets"));
+    EXPECT_THAT(error_for(name + "()"), HasSubstr("and has 0"));
+    EXPECT_THAT(error_for(name + "(1, 2, 3, 4)"), HasSubstr("and has 4"));
+    EXPECT_THAT(error_for(name), HasSubstr("brackets"));
   }
 }
 
@@ -138,7 +138,7 @@ TEST(ExpressionTest, AnInvalidTextIsRefusedWithTheReason) {
            {"()", "a value is missing before `)`"},
            {"min(1,)", "a value is missing before `)`"},
            {std::string(kLongestText + 1, '1'), "at most 1000"}}) {
-    EXPECT_THAT(objection_to(text), HasSubstr(reason)) << text;
+    EXPECT_THAT(error_for(text), HasSubstr(reason)) << text;
   }
 }
 

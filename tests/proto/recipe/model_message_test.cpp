@@ -26,7 +26,8 @@ TEST(ModelMessageTest, AModelOutsideItsDomainIsRefusedUnlessReadUnchecked) {
   EXPECT_EQ(from_message_unchecked(message).spectral_radius, 1.0);
   message = to_message(unusual_model());
   message.set_elements_per_link(4'000'000'000U);
-  EXPECT_THROW(from_message_unchecked(message), solver::InputError) << "no model could hold it";
+  EXPECT_THROW(from_message_unchecked(message), solver::InputError)
+      << "the number exceeds the range of the field";
 }
 
 // Databases store these texts. A changed text needs a new version in its first word and a new
@@ -42,7 +43,7 @@ TEST(Canonical, TheTextOfAModelNeverChanges) {
             "spectral_radius=0.5 dt=1e-06 dt_fall=2e-06 tolerance=1e-06");
 }
 
-TEST(ModelMessageTest, AModelComesBackFromAFrame) {
+TEST(ModelMessageTest, AModelIsTheSameAfterEncodingAndDecoding) {
   std::vector<solver::ModelParameters> models{unusual_model()};
   for (const auto name : solver::preset_names()) {
     models.push_back(solver::preset(name));
@@ -69,14 +70,14 @@ TEST(Canonical, ZeroHasNoSignAndADefaultToleranceIsNotWritten) {
   EXPECT_EQ(canonical_model(model), text + " tolerance=1e-06");
 }
 
-TEST(Canonical, TheDigestOfARecipeNamesStudies) {
+TEST(Canonical, TheDigestOfARecipeNeverChanges) {
   EXPECT_EQ(sha256_of("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
-      << "of FIPS 180-4";
+      << "the value comes from FIPS 180-4";
   EXPECT_EQ(recipe_digest(recipe_of({kPoint})),
             "8344f39bccb110503a4c571f76d91034e47923dc20725c348e2c03a11a402663");
 }
 
-TEST(Canonical, ModelErrorsBlocksAndTheOrderOfAxesCount) {
+TEST(Canonical, TheDigestDependsOnModelErrorsBlocksAndTheOrderOfAxes) {
   const auto k = listed("k", {1e7, 2e7});
   const auto eta2 = listed("eta2", {1.0, 2.0});
   const auto with = [](std::vector<Axis> axes) {
@@ -129,7 +130,7 @@ TEST(ModelInput, ErrorsHaveTheKeyAndTheInvalidValue) {
   const struct {
     ModelInput model;
     const char* key;
-    const char* says;
+    const char* expected;
   } wrong[] = {
       {{.values = {{"tip_mas", 1}}}, "tip_mas", "did you mean `tip_mass`"},
       {{.values = {{"rho", -1}}}, "rho", "rho = -1"},
@@ -140,13 +141,13 @@ TEST(ModelInput, ErrorsHaveTheKeyAndTheInvalidValue) {
       {{.lengths_m = {{0.4}}, .values = {{"links", 1}}}, "lengths", "lengths cannot be combined"},
       {{.lengths_m = {{0.4}}, .values = {{"length", 1}}}, "lengths", "lengths cannot be combined"},
   };
-  for (const auto& [model, key, says] : wrong) {
+  for (const auto& [model, key, expected] : wrong) {
     try {
       (void)model.model();
-      ADD_FAILURE() << says;
+      ADD_FAILURE() << expected;
     } catch (const solver::InputError& error) {
       EXPECT_EQ(error.fields().key, key);
-      EXPECT_THAT(error.what(), HasSubstr(says));
+      EXPECT_THAT(error.what(), HasSubstr(expected));
     }
   }
 }
@@ -163,9 +164,9 @@ TEST(StudyName, MayBeAnyVisibleText) {
 TEST(StudyName, IsRefusedAndShownEscapedIfItHasInvisibleCharacters) {
   for (const auto& name : {"a\x1b[2J"s, "a\0b"s, "two\nlines"s, "\x7f"s, "\u009b2J"s, "a\u202eb"s,
                            "\u200e"s, "a\xff"s, "a\u200bb"s, "\ufeff"s, "a\u00adb"s}) {
-    const auto objection = study_name_error(name);
-    EXPECT_THAT(objection, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
-                                 testing::Not(HasSubstr(name))));
+    const auto name_error = study_name_error(name);
+    EXPECT_THAT(name_error, AllOf(HasSubstr("control characters"), HasSubstr("\\"),
+                                  testing::Not(HasSubstr(name))));
   }
 }
 

@@ -160,7 +160,7 @@ TEST(PointInputs, MayDifferInTheLastBitsAndAreStoredAsSent) {
   EXPECT_EQ(inputs_of(result, table).H_m, H_m);
 }
 
-TEST(PointInputs, ThatDifferByMoreAreRefused) {
+TEST(PointInputs, ThatDifferByMoreThanTheLastBitsAreRefused) {
   const PointTable table = table_of_lengths();
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
@@ -177,7 +177,8 @@ TEST(PointInputs, ThatDifferByMoreAreRefused) {
   }
   PointResult result = result_of(2, table);
   result.set_mu(1e-300);
-  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("mu")) << "the study has 0";
+  EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("mu"))
+      << "the point of the study has mu = 0";
 }
 
 TEST(PointInputs, IncludeWholeNumbersAndLengthsOfTheModel) {
@@ -192,7 +193,7 @@ TEST(PointInputs, IncludeWholeNumbersAndLengthsOfTheModel) {
   }
 }
 
-TEST(PointInputs, AreComparedAlsoInTextsOfModels) {
+TEST(PointInputs, AreAlsoComparedInTheTextsOfModels) {
   const std::string own = canonical_model(solver::preset("paper"));
   const auto with = [&](const std::string& part, const std::string& other) {
     return std::string(own).replace(own.find(part), part.size(), other);
@@ -230,7 +231,8 @@ TEST(PointInputs, MayBeMissingOnlyInAFailedPoint) {
   EXPECT_THAT(fault_of_inputs(result, table), HasSubstr("with H = "));
   result.set_error("it never fell");
   EXPECT_THAT(fault_of_inputs(result, table), IsEmpty());
-  EXPECT_EQ(inputs_of(result, table).mu, table.point(3).mu) << "the study's own";
+  EXPECT_EQ(inputs_of(result, table).mu, table.point(3).mu)
+      << "missing inputs are taken from the study";
 }
 
 using testing::AllOf;
@@ -250,13 +252,13 @@ TEST(StudySize, CountsDifferentFallsExactlyUpToAHundredThousandPoints) {
   const auto drawn = size_of_blocks(
       {sampled({uniform("E", 6e10, 8e10), uniform("k", 1e7, 1e8), kSomeH, kSomeMu, kSomeE},
                SAMPLE_SOBOL, 100'000)});
-  EXPECT_EQ(drawn.falls, 100'000U) << "every E falls in its own way";
+  EXPECT_EQ(drawn.falls, 100'000U) << "each value of E needs its own fall";
   EXPECT_FALSE(drawn.falls_estimated);
   const auto several = size_of_blocks({sampled(
       {range("E", 6e10, 8e10, 21), uniform("k", 1e7, 1e8), kSomeH, uniform("mu", 0.1, 1), kSomeE},
       SAMPLE_LATIN_HYPERCUBE, 20'000)});
   EXPECT_EQ(several.models, 20'000U);
-  EXPECT_EQ(several.falls, 21U) << "k acts in contact alone";
+  EXPECT_EQ(several.falls, 21U) << "k acts only in contact";
 }
 
 TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
@@ -269,7 +271,7 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
 
 // A third of 10^4 examined points pass the filter. The tolerance of this share, 0.02, is four
 // standard deviations.
-TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
+TEST(StudySize, EstimatesThePointsThatPassAFilterInALargeStudy) {
   const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
   const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");
   const auto size = size_of_blocks({plain, large});
@@ -282,7 +284,7 @@ TEST(StudySize, EstimatesThePointsThatPassAFilterAboveThatNumber) {
 }
 
 // The tolerance of 400 is more than four standard deviations of the estimate.
-TEST(StudySize, EstimatesTheFallsFromTenThousandPointsAboveThatNumber) {
+TEST(StudySize, EstimatesTheFallsOfALargeStudyFromTenThousandPoints) {
   const auto shared = size_of_blocks(
       {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});
   EXPECT_TRUE(shared.falls_estimated);
@@ -290,7 +292,7 @@ TEST(StudySize, EstimatesTheFallsFromTenThousandPointsAboveThatNumber) {
   const auto known = size_of_blocks({filtered(
       {listed("E", {6e10, 7e10, 8e10}), kSomeH, range("mu", 0.1, 1, 100'000), kSomeE}, "")});
   EXPECT_EQ(known.falls, 3U);
-  EXPECT_FALSE(known.falls_estimated) << "each was met many times";
+  EXPECT_FALSE(known.falls_estimated) << "each fall occurred many times, so the count is exact";
   EXPECT_EQ(known.examples.size(), 64U);
   const auto drawn = size_of_blocks(
       {sampled({uniform("E", 6e10, 8e10), kSomeH, kSomeMu, kSomeE}, SAMPLE_RANDOM, 1'000'000'000)});

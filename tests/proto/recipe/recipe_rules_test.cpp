@@ -73,8 +73,8 @@ Axis with_value(Axis axis, double value) {
 
 struct Refused {
   Block block;
-  std::string key = {};   ///< key that the error names
-  std::string says = {};  ///< part of the message; empty if the block is allowed
+  std::string key = {};       ///< key that the error names
+  std::string expected = {};  ///< part of the message; empty if the block is allowed
 };
 
 void expect_refusals(const std::vector<Refused>& blocks) {
@@ -86,8 +86,8 @@ void expect_refusals(const std::vector<Refused>& blocks) {
       error = refused.fields();
     }
     EXPECT_EQ(error.key, each.key) << each.block.DebugString();
-    EXPECT_EQ(error.text.empty(), each.says.empty()) << error.text << each.block.DebugString();
-    EXPECT_THAT(error.text, HasSubstr(each.says)) << each.block.DebugString();
+    EXPECT_EQ(error.text.empty(), each.expected.empty()) << error.text << each.block.DebugString();
+    EXPECT_THAT(error.text, HasSubstr(each.expected)) << each.block.DebugString();
   }
 }
 
@@ -135,7 +135,7 @@ TEST(RecipeRules, ListsAndRangesHaveAllowedValues) {
   });
 }
 
-TEST(RecipeRules, ARangeIsRefusedExactlyWhenOneOfItsValuesIs) {
+TEST(RecipeRules, ARangeIsRefusedExactlyWhenOneOfItsValuesIsNotAllowed) {
   const solver::ParameterKey& key = *solver::find_model_key("elements_per_link");
   for (const double from : {1.0, 2.0, 7.0}) {
     for (const double to : {8.0, 13.0, 256.0}) {
@@ -223,7 +223,7 @@ TEST(RecipeRules, ARecipeTooLongForAWorkerIsRefused) {
   EXPECT_THROW(check_size(recipe), solver::InputError);
 }
 
-TEST(RecipeRules, ARecipeHasBlocksAndAModelInItsDomain) {
+TEST(RecipeRules, ARecipeNeedsBlocksAndAnAllowedModel) {
   EXPECT_THAT(refusal(recipe_of({})), HasSubstr("no block"));
   EXPECT_THAT(refusal(recipe_of_blocks({of_mu(kMu), of_mu(listed("mu", {-1}))})),
               StartsWith("block 2: mu = -1"));

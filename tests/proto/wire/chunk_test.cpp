@@ -40,7 +40,7 @@ TEST(Chunk, IsReadAsItWasWritten) {
   EXPECT_FALSE(rows.next());
 }
 
-TEST(Chunk, OfATableHasItsRows) {
+TEST(Chunk, ContainsTheRowsOfItsTable) {
   Table whole;
   append_rows(two_rows(), whole);
   ASSERT_EQ(whole.rows.size(), 2U);

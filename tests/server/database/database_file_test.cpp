@@ -50,7 +50,7 @@ class ReadOnlyFolderTest : public StoreFixture {
 
   /// Runs `what` as a user who can write only in `out`; root could write everywhere. Then ends the
   /// process, with status 0 if `what` returned true.
-  void as_stranger(const std::function<bool()>& what) const {
+  void exit_as_other_user(const std::function<bool()>& what) const {
     constexpr uid_t kNoProcess = 65534;
     if (::geteuid() == 0 && (::setgid(kNoProcess) != 0 || ::setuid(kNoProcess) != 0)) {
       std::_Exit(2);
@@ -78,20 +78,20 @@ std::size_t rows_of(const std::string& path) {
   return Reader(path).query("SELECT point FROM results", kNoLimits).rows.size();
 }
 
-TEST_F(ReadOnlyFolderTest, EveryRowIsReadAlsoThoseThatAreOnlyInTheLog) {
+TEST_F(ReadOnlyFolderTest, RowsOfTheFileAndOfTheLogAreRead) {
   for (const auto& [name, rows] : {std::pair{"alone", 2U}, std::pair{"with_log", 3U}}) {
     const std::string file = file_in(name);
-    EXPECT_EXIT(as_stranger([&, expected = rows] { return rows_of(file) == expected; }),
+    EXPECT_EXIT(exit_as_other_user([&, expected = rows] { return rows_of(file) == expected; }),
                 testing::ExitedWithCode(0), "")
         << name;
   }
 }
 
-TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
+TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkInAReadOnlyFolder) {
   const std::string file = file_in("with_log");
   const std::string copy = folder_.file("out/copy.db");
   const std::string saved = folder_.file("out/saved.db");
-  EXPECT_EXIT(as_stranger([&] {
+  EXPECT_EXIT(exit_as_other_user([&] {
                 back_up(file, copy);
                 return Reader(file).study_status("a").at(0).solved() == 3 &&
                        diagnose(file).faults.empty() && rows_of(copy) == 3 &&
@@ -103,7 +103,7 @@ TEST_F(ReadOnlyFolderTest, StatusCheckBackupAndSalvageWorkToo) {
 TEST_F(ReadOnlyFolderTest, PermissionDeniedIsReportedWithTheRemedy) {
   const std::string file = file_in("alone");
   ::chmod(file.c_str(), ::geteuid() == 0 ? 0600 : 0);
-  EXPECT_EXIT(as_stranger([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
+  EXPECT_EXIT(exit_as_other_user([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
               "permission denied. Only its owner can read");
 }
 
@@ -116,7 +116,7 @@ TEST(FileSystemOf, AMissingPathHasTheFileSystemOfItsParent) {
   for (const char* type : {"ext4", "tmpfs", "overlay", "fuseblk", "fuse.mergerfs"}) {
     EXPECT_FALSE(is_network_file_system(type)) << type;
   }
-  EXPECT_EQ(network_disk_error("/dev/shm/oblique.db"), "") << "it is local";
+  EXPECT_EQ(network_disk_error("/dev/shm/oblique.db"), "") << "a local file has no network error";
 }
 
 }  // namespace

@@ -41,7 +41,7 @@ TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
             (protocol::Row{std::int64_t{30}, std::int64_t{30}}));
   ClientRequest workers;
   workers.mutable_workers();
-  const auto known = client.ask(workers).workers();
+  const auto known = client.reply_to(workers).workers();
   ASSERT_EQ(known.workers_size(), 1);
   EXPECT_EQ(known.workers(0).solved_points(), 30U);
 }
@@ -56,7 +56,7 @@ TEST_F(EventLoopTest, ResultsOfAnotherStudyAreReused) {
   ClientRequest request;
   request.mutable_submit()->set_name("b");
   *request.mutable_submit()->mutable_recipe() = table_of(20)->recipe();
-  const auto reply = client.ask(request).submit();
+  const auto reply = client.reply_to(request).submit();
   EXPECT_EQ(reply.completed(), 20U);
   EXPECT_EQ(reply.reused().points(), 20U);
   EXPECT_EQ(client.status("b").state(), "done");
@@ -64,7 +64,7 @@ TEST_F(EventLoopTest, ResultsOfAnotherStudyAreReused) {
             protocol::Row{std::int64_t{20}});
 }
 
-TEST_F(EventLoopTest, ARestartedServerContinues) {
+TEST_F(EventLoopTest, ARestartedServerContinuesItsStudies) {
   {
     RunningServer server(path_);
     SimulatedClient client(server.client_endpoint());
@@ -165,13 +165,14 @@ TEST_F(EventLoopTest, ALongRecipeIsStoredAndLeasedWithoutDelayingOthers) {
 }
 
 /// In this query SQLite compares bytes for hours without checking for an interrupt.
-constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
+constexpr const char* kUninterruptible =
+    "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 TEST_F(EventLoopTest, ALongQueryDelaysNothingElse) {
   RunningServer server(path_);
   SimulatedClient client(server.client_endpoint());
   SimulatedClient other(server.client_endpoint());
-  other.start_query(kDeaf);
+  other.start_query(kUninterruptible);
   EXPECT_TRUE(client.submit("a", 10).has_submit());
   EXPECT_EQ(client.status("a").points(), 10U);
   EXPECT_EQ(client.rows("SELECT 3").rows.at(0), protocol::Row{std::int64_t{3}});
@@ -187,7 +188,7 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
   RunningServer server(path_, queue, {}, clients);
   for (int i = 0; i < 2; ++i) {
     SimulatedClient client(server.client_endpoint());
-    client.send(SimulatedClient::query_request(kDeaf));
+    client.send(SimulatedClient::query_request(kUninterruptible));
     // The reply to this later request shows that the query has arrived.
     EXPECT_TRUE(client.submit("a", 10).has_submit());
   }
@@ -198,7 +199,7 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
 TEST_F(EventLoopTest, RunningQueriesDoNotDelayAStop) {
   RunningServer server(path_);
   SimulatedClient client(server.client_endpoint());
-  client.start_query(kDeaf);
+  client.start_query(kUninterruptible);
   EXPECT_EQ(server.stop().lost_writes, 0U);
   while (!client.receive().has_error()) {
   }
@@ -216,10 +217,10 @@ TEST_F(EventLoopTest, StatusShowsWhichPeersAreAdmitted) {
     ClientRequest status;
     status.mutable_status();
     const std::string access = is_insecure ? "insecure" : "loopback";
-    EXPECT_EQ(client.ask(status).status().access(), access);
+    EXPECT_EQ(client.reply_to(status).status().access(), access);
     ClientRequest workers;
     workers.mutable_workers();
-    EXPECT_EQ(client.ask(workers).workers().access(), access);
+    EXPECT_EQ(client.reply_to(workers).workers().access(), access);
   }
 }
 

@@ -141,7 +141,7 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
     protocol::set_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version("1.0");
     message.mutable_hello()->set_instruction_set("avx2");
-    message.mutable_hello()->set_name("pretended");
+    message.mutable_hello()->set_name("fake");
     message.mutable_hello()->set_threads(1);
     send(message);
     return receive();
@@ -216,7 +216,7 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
  public:
   using Peer::Peer;
 
-  ClientReply ask(ClientRequest request) {
+  ClientReply reply_to(ClientRequest request) {
     request.set_protocol_version(protocol::kProtocolVersion);
     request.set_request_id(++id_);
     send(request);
@@ -228,7 +228,7 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
     ClientRequest request;
     request.mutable_submit()->set_name(name);
     *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
-    return ask(request);
+    return reply_to(request);
   }
   static ClientRequest query_request(const std::string& sql) {
     ClientRequest request;
@@ -237,7 +237,7 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
     request.mutable_query()->set_time_limit_ms(kLongestTimeLimit_ms);
     return request;
   }
-  ClientReply query(const std::string& sql) { return ask(query_request(sql)); }
+  ClientReply query(const std::string& sql) { return reply_to(query_request(sql)); }
   /// Runs a query and returns the rows of the first chunk.
   protocol::Table rows(const std::string& sql) {
     protocol::Table table;
@@ -257,12 +257,12 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
         return;
       }
     }
-    FAIL() << "the query does not begin";
+    FAIL() << "the query did not begin";
   }
   protocol::StudyStatus status(const std::string& name) {
     ClientRequest request;
     request.mutable_status()->set_study(name);
-    return ask(request).status().studies(0);
+    return reply_to(request).status().studies(0);
   }
 
  private:

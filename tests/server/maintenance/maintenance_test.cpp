@@ -69,10 +69,10 @@ TEST_F(MaintenanceTest, ACopyOfAnOpenDatabaseHasAllCommittedRows) {
   EXPECT_EQ(copy.database_id(), store().database_id());
   EXPECT_EQ(std::filesystem::status(copy_).permissions(),
             std::filesystem::perms::owner_read | std::filesystem::perms::owner_write)
-      << "a copy is its owner's alone";
+      << "only the owner may read and write a copy";
 }
 
-TEST_F(MaintenanceTest, OnlyOurDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) {
+TEST_F(MaintenanceTest, OnlyObliqueDatabasesAreCopiedOrSalvagedAndNoFileIsReplaced) {
   const std::string notes = folder_.file("notes.txt");
   std::ofstream(notes) << "not a database, and long enough to be sure of it";
   std::ofstream(folder_.file("empty.db"));
@@ -144,11 +144,11 @@ TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) 
   }
 }
 
-TEST_F(SalvageTest, ADamagedRowIsNotSavedButAStudyOrModelWithADamagedValueIsWithItsRows) {
+TEST_F(SalvageTest, DamagedResultsAreSkippedButStudiesAndModelsWithADamagedValueAreSaved) {
   close();
   auto others = rows_of(path_);
   others.erase(others.begin() + 3);
-  by_hand(
+  execute_sql(
       "UPDATE studies SET created_at = 'x'; UPDATE models SET E = E + 1;"
       "UPDATE results SET peaks = replace(peaks, '1', '2') WHERE point = 3");
   EXPECT_EQ(salvage(path_, copy_).unreadable_places, 1U);
@@ -171,16 +171,16 @@ TEST_F(SalvageTest, ASoundDatabaseIsSalvagedCompletelyAndNotChanged) {
 
 TEST_F(SalvageTest, ATableThatLostAColumnIsSavedWithoutItUnlessItsRowsNeedTheColumn) {
   close();
-  by_hand(
+  execute_sql(
       "ALTER TABLE studies DROP COLUMN reuses; DROP VIEW runs;"
       "ALTER TABLE results DROP COLUMN margin");
   EXPECT_EQ(salvage(path_, copy_).results, 5U);
   EXPECT_THAT(faults(copy_), IsEmpty());
   std::filesystem::remove(copy_);
-  by_hand("ALTER TABLE results DROP COLUMN slide_m");
+  execute_sql("ALTER TABLE results DROP COLUMN slide_m");
   const auto saved = salvage(path_, copy_);
   EXPECT_EQ(saved.studies, 1U);
-  EXPECT_EQ(saved.unreadable_places, 5U) << "a solved point has it";
+  EXPECT_EQ(saved.unreadable_places, 5U) << "a solved point has a slide";
   EXPECT_THAT(faults(copy_), IsEmpty());
 }
 
@@ -191,7 +191,7 @@ TEST_F(SalvageTest, ReusedResultsAreCountedAgainAndPointsThatAFilterLeavesOutAre
           AddResults{2, filtered, 1, "0.1", "avx2", 1, "now", {}, IntervalSet(4, 10)},
           SetStudyState{2, StudyState::kDone, "now"}});
   close();
-  by_hand("DELETE FROM reused_points");
+  execute_sql("DELETE FROM reused_points");
   salvage(path_, copy_);
   EXPECT_THAT(faults(copy_), testing::IsEmpty());
   Store saved(copy_);
@@ -204,7 +204,7 @@ TEST_F(SalvageTest, ReusedResultsAreCountedAgainAndPointsThatAFilterLeavesOutAre
 
 // ---- Checks -------------------------------------------------------------------------------------
 
-TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
+TEST_F(MaintenanceTest, InputsThatDifferInTheLastBitsAreNoFault) {
   protocol::PointResult result = solved_point(5, *study_.table.get());
   result.set_mu(std::nextafter(result.mu(), 1.0));
   commit({results_of(study_, {result})});
@@ -212,7 +212,7 @@ TEST_F(MaintenanceTest, RowsWithTheLastBitsOfAnotherMachineAreSound) {
   const DatabaseHandle database = open_database(path_, SQLITE_OPEN_READONLY);
   Statement row(database.get(), "SELECT mu FROM results WHERE point = 5");
   ASSERT_TRUE(row.step());
-  EXPECT_EQ(row.real(0), result.mu()) << "as it was solved";
+  EXPECT_EQ(row.real(0), result.mu()) << "the row keeps the value that was solved";
 }
 
 TEST_F(MaintenanceTest, ADamagedPageIsFoundAndNotCopiedAndTheErrorHasTheRemedy) {
@@ -228,7 +228,7 @@ TEST_F(MaintenanceTest, TheChecksumCoversEveryColumnOfAResult) {
   close();
   std::filesystem::copy_file(path_, copy_);
   for (const std::string_view column : result_columns()) {
-    by_hand(
+    execute_sql(
         fmt::format("UPDATE results SET {0} = CASE typeof({0}) WHEN 'text' THEN {0} || ' '"
                     " WHEN 'null' THEN 1 ELSE {0} + 1 END WHERE point = 4",
                     column));
@@ -241,7 +241,7 @@ TEST_F(MaintenanceTest, TheChecksumCoversEveryColumnOfAResult) {
 
 TEST_F(MaintenanceTest, ChangedStudiesAndModelsAndDanglingReferencesAreFound) {
   close();
-  by_hand(
+  execute_sql(
       "UPDATE studies SET created_at = 'b'; UPDATE models SET E = E + 1;"
       "INSERT INTO reused_points VALUES (7, 'b', 1)");
   EXPECT_THAT(faults(),
@@ -266,7 +266,7 @@ TEST_F(MaintenanceTest, EveryTableThatIsMissingOrHasOtherColumnsOrIsAViewIsNamed
           "DROP TABLE {0}; CREATE VIEW {0} AS WITH RECURSIVE n(i) AS"
           " (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS study_id FROM n WHERE i < 0"}) {
       std::filesystem::copy_file(path_, copy_, std::filesystem::copy_options::overwrite_existing);
-      by_hand(copy_, fmt::format(fmt::runtime(change), table));
+      execute_sql(copy_, fmt::format(fmt::runtime(change), table));
       EXPECT_THAT(faults(copy_), ElementsAre(HasSubstr("the table " + table + " is")));
       EXPECT_THROW(Store{copy_}, StorageError) << change << " of " << table;
     }
@@ -278,18 +278,18 @@ TEST_F(MaintenanceTest, CompletedPointsThatDifferFromTheRowsAreNamedWithTheRemed
   for (const char* change :
        {"UPDATE completed_ranges SET points = 6", "UPDATE completed_ranges SET points = 4",
         "UPDATE completed_ranges SET first_point = 1"}) {
-    by_hand(change);
+    execute_sql(change);
     EXPECT_THAT(faults(), Contains(HasSubstr("UPDATE studies SET counted = 0"))) << change;
   }
-  by_hand("UPDATE completed_ranges SET first_point = 0, points = 5");
-  by_hand("UPDATE studies SET state = 'done'");
+  execute_sql("UPDATE completed_ranges SET first_point = 0, points = 5");
+  execute_sql("UPDATE studies SET state = 'done'");
   EXPECT_THAT(faults(), ElementsAre("study a is done: 5 of 10 points have a result"));
 }
 
 TEST_F(MaintenanceTest, ADoneStudyWithRowsDeletedByHandIsSound) {
   commit({solved(study_, numbers(5, 10))});
   close();
-  by_hand("UPDATE studies SET state = 'done'; DELETE FROM results WHERE point > 6");
+  execute_sql("UPDATE studies SET state = 'done'; DELETE FROM results WHERE point > 6");
   EXPECT_THAT(faults(), IsEmpty());
   EXPECT_THAT(diagnose(path_).remarks, Contains("study a is done: 7 of 10 points have a result"));
 }
@@ -302,7 +302,7 @@ class RowFaultsTest : public StoreFixture {
     const auto study = study_of(5);
     commit({study, worker(1), solved(study, {0, 1}), failed(study, {2})});
     close();
-    by_hand("UPDATE results SET checksum = NULL; UPDATE studies SET checksum = NULL");
+    execute_sql("UPDATE results SET checksum = NULL; UPDATE studies SET checksum = NULL");
   }
 };
 
@@ -321,12 +321,12 @@ TEST_F(RowFaultsTest, ARowWithoutAChecksumIsComparedWithTheRecipe) {
   const std::string columns = fmt::format("{}", fmt::join(result_columns(), ", "));
   EXPECT_THAT(faults(), IsEmpty());
   EXPECT_THAT(diagnose(path_).remarks, Contains(HasSubstr("3 of 3 results have no checksum")));
-  for (const auto& [change, said] : damages) {
-    by_hand("CREATE TABLE before AS SELECT " + columns + " FROM results WHERE point = 1");
-    by_hand("UPDATE results SET " + change + " WHERE point = 1");
-    EXPECT_THAT(faults(), Contains(HasSubstr(said))) << change;
-    by_hand("DELETE FROM results WHERE point IN (1, 77); INSERT INTO results (" + columns +
-            ") SELECT * FROM before; DROP TABLE before");
+  for (const auto& [change, expected] : damages) {
+    execute_sql("CREATE TABLE before AS SELECT " + columns + " FROM results WHERE point = 1");
+    execute_sql("UPDATE results SET " + change + " WHERE point = 1");
+    EXPECT_THAT(faults(), Contains(HasSubstr(expected))) << change;
+    execute_sql("DELETE FROM results WHERE point IN (1, 77); INSERT INTO results (" + columns +
+                ") SELECT * FROM before; DROP TABLE before");
   }
 }
 
@@ -340,20 +340,20 @@ TEST_F(RowFaultsTest, AModelThatDiffersFromTheRecipeIsNamed) {
 }
 
 TEST_F(RowFaultsTest, ARecipeThatCannotBeReadOrHasOtherPointsIsNamed) {
-  by_hand("UPDATE studies SET points = 6");
+  execute_sql("UPDATE studies SET points = 6");
   EXPECT_THAT(faults(), Contains(HasSubstr("it has 5 points, and the study 6")));
-  by_hand("UPDATE studies SET points = 5, recipe = x'ff'");
+  execute_sql("UPDATE studies SET points = 5, recipe = x'ff'");
   EXPECT_THAT(faults(), Contains(HasSubstr("its recipe cannot be read")));
 }
 
 TEST_F(RowFaultsTest, AStudyThatWouldPreventAStartIsNamed) {
-  by_hand("CREATE TABLE before AS SELECT * FROM studies");
+  execute_sql("CREATE TABLE before AS SELECT * FROM studies");
   for (const char* change : {"points = 1000000000000000000", "points = -1",
                              "priority = 9223372036854775807", "name = ''", "name = char(27)",
                              "name = hex(zeroblob(1000))", "created_at = hex(zeroblob(1000))"}) {
-    by_hand(std::string("PRAGMA ignore_check_constraints = ON; UPDATE studies SET ") + change);
+    execute_sql(std::string("PRAGMA ignore_check_constraints = ON; UPDATE studies SET ") + change);
     EXPECT_THAT(faults(), Contains(HasSubstr("study 1, "))) << change;
-    by_hand("DELETE FROM studies; INSERT INTO studies SELECT * FROM before");
+    execute_sql("DELETE FROM studies; INSERT INTO studies SELECT * FROM before");
   }
 }
 
@@ -373,9 +373,9 @@ class OfflineStudyTest : public MaintenanceTest {
 
 TEST_F(OfflineStudyTest, AStudyIsRenamedUnlessTheNameIsInUseOrInvalid) {
   commit({study_of(10, 2, "b")});
-  EXPECT_THROW(rename_study(path_, 1, "c"), StorageError) << "a server works on it";
+  EXPECT_THROW(rename_study(path_, 1, "c"), StorageError) << "a server uses the database";
   EXPECT_THROW(delete_study(path_, 1), StorageError);
-  EXPECT_THROW(rename_study(copy_, 1, "c"), StorageError) << "there is no such file";
+  EXPECT_THROW(rename_study(copy_, 1, "c"), StorageError) << "the database does not exist";
   EXPECT_FALSE(std::filesystem::exists(copy_));
   close();
   rename_study(path_, 1, "friction");
@@ -451,7 +451,7 @@ TEST_F(MaintenanceTest, AFileOfAnotherSchemaIsRefusedWithBothNumbersAndTheRemedy
   close();
   for (const auto& [schema, written_by] :
        {std::pair{kSchemaVersion - 1, "older"}, std::pair{kSchemaVersion + 1, "newer"}}) {
-    by_hand(fmt::format("PRAGMA user_version = {}; PRAGMA journal_mode = DELETE", schema));
+    execute_sql(fmt::format("PRAGMA user_version = {}; PRAGMA journal_mode = DELETE", schema));
     const std::string before = contents();
     for (const auto& [name, open] : openers) {
       EXPECT_THAT(open, testing::ThrowsMessage<StorageError>(fmt::format(

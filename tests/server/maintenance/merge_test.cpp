@@ -122,16 +122,16 @@ TEST_F(MergeTest, StudiesOfSeveralDatabasesAreMergedWithAllRows) {
       "SELECT group_concat(quote(H) || quote(mu) || quote(fn_peak_N) || quote(closure) ||"
       " quote(peaks) || quote(reaction_peaks) || quote(steps) || quote(wall_s) || solved_at)"
       " FROM (SELECT * FROM runs WHERE study = 'b' ORDER BY point)";
-  EXPECT_EQ(text("all", outputs), text("one", outputs)) << "bit for bit";
+  EXPECT_EQ(text("all", outputs), text("one", outputs)) << "outputs must be copied bit for bit";
   const Merged again = merge("one");
   EXPECT_EQ(again.results_known, 13U);
-  EXPECT_EQ(again.studies_added + again.results_added, 0U) << "it was merged before";
+  EXPECT_EQ(again.studies_added + again.results_added, 0U) << "a second merge adds nothing";
   EXPECT_EQ(text("all", "SELECT (SELECT count(*) FROM models) || (SELECT count(*) FROM workers)"),
             "12")
-      << "equal workers are one";
+      << "equal models and equal workers are stored once";
 }
 
-TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndItIsDoneWhenNoneIsLeft) {
+TEST_F(MergeTest, PointsOfOneStudyAreUnitedAndTheStudyIsDoneWhenNoPointIsOpen) {
   make("all", {{.end = 4}});
   make("one", {{.first = 4, .end = 7}});
   make("two", {{.first = 5, .end = 10}});
@@ -179,7 +179,7 @@ TEST_F(MergeTest, ASolvedRowReplacesAFailedOneButNotViceVersa) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ANameWithAnotherRecipeRefusesTheSourceUnlessAPrefixIsGiven) {
+TEST_F(MergeTest, AStudyOfTheSameNameWithAnotherRecipeIsRefusedUnlessAPrefixIsGiven) {
   make("all", {{.study = "a", .end = 1}});
   make("one", {{.study = "b", .end = 2}, {.study = "a", .table = table_of(11), .end = 5}});
   EXPECT_THAT(refusal("one"), AllOf(HasSubstr("a study called \"a\""), HasSubstr("block 1 differs"),
@@ -210,15 +210,15 @@ TEST_F(MergeTest, ASourceWithAnyFaultIsRefused) {
         " (SELECT 0 UNION ALL SELECT x FROM t) SELECT x AS study_id FROM t"}) {
     const std::string source = "source" + std::to_string(++number);
     make(source, {{.study = "b", .end = 2}, {.end = 9}});
-    by_hand(file(source), change);
+    execute_sql(file(source), change);
     EXPECT_THROW(merge(source), StorageError) << change;
   }
   EXPECT_EQ(text("all", "SELECT count(*) FROM studies"), "0");
 }
 
-TEST_F(MergeTest, TheSourceIsNotChangedAndItsStateIsCopied) {
+TEST_F(MergeTest, TheSourceIsNotChangedAndTheStateOfItsStudyIsCopied) {
   make("one", {{.end = 5}});
-  by_hand(file("one"), "UPDATE studies SET priority = 7");
+  execute_sql(file("one"), "UPDATE studies SET priority = 7");
   Store(file("one")).commit(std::vector<Change>{SetStudyState{1, StudyState::kPaused, "later"}});
   const auto bytes = [&] {
     std::ifstream stream(file("one"), std::ios::binary);
@@ -266,7 +266,8 @@ TEST_F(MergeTest, AKilledMergeChangesNothingAndCanBeRepeated) {
   EXPECT_THAT(faults(file("all")), IsEmpty());
   EXPECT_EQ(Store(file("all")).studies().size(), 1U);
   EXPECT_EQ(merge("one").results_added, 20'000U);
-  EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging")) << "nor a copy of the source";
+  EXPECT_FALSE(std::filesystem::exists(file("all") + ".merging"))
+      << "the temporary copy of the source was not deleted";
 }
 
 TEST_F(MergeTest, AGrownStudyIsUnitedWithItsShorterVersion) {
@@ -289,7 +290,7 @@ TEST_F(MergeTest, AGrownStudyIsUnitedWithItsShorterVersion) {
     EXPECT_EQ(text("all", "SELECT state || points FROM studies WHERE name = '" + name + "'"),
               "running20");
     EXPECT_THAT(faults(file("all")), IsEmpty());
-    EXPECT_EQ(merge(name).results_added, 0U) << "merged again";
+    EXPECT_EQ(merge(name).results_added, 0U) << "a second merge adds nothing";
   }
 }
 
@@ -318,16 +319,16 @@ TEST_F(MergeTest, CompletedPointsThatAFilterLeavesOutAreUnited) {
 
 TEST_F(MergeTest, ASourceWhoseRowsWereChangedByHandIsMergedByItsRows) {
   make("one", {{.end = 10}});
-  by_hand(file("one"),
-          "DELETE FROM results WHERE point = 3;"
-          "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
+  execute_sql(file("one"),
+              "DELETE FROM results WHERE point = 3;"
+              "UPDATE results SET checksum = NULL, wall_s = 7 WHERE point = 1");
   merge("one");
   EXPECT_EQ(ranges("all"), "0+3,4+6");
   EXPECT_EQ(text("all", "SELECT group_concat(point) FROM results WHERE checksum IS NULL"), "1");
   EXPECT_THAT(faults(file("all")), IsEmpty());
 }
 
-TEST_F(MergeTest, ReusedResultsKeepTheNamesOfTheirSourceAndAreCounted) {
+TEST_F(MergeTest, ReusedResultsStillNameTheirSourceAndAreCounted) {
   make("one",
        {{.study = "a/b", .end = 4}, {.study = "gone", .first = 4, .end = 10}, {.study = "c"}});
   {

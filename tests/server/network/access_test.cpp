@@ -44,7 +44,7 @@ std::string address_or_error(const AccessSettings& settings) {
   }
 }
 
-TEST(AddressToBindTest, WithoutKeysOrInsecureOnlyLoopbackIsAllowed) {
+TEST(AddressToBindTest, OnlyLoopbackIsAllowedWithoutKeysUnlessInsecureIsGiven) {
   EXPECT_EQ(address_to_bind({.listen = "localhost"}), "127.0.0.1");
   for (const std::string address : {"127.3.2.1", "::1"}) {
     EXPECT_EQ(address_to_bind({.listen = address}), address);
@@ -61,7 +61,7 @@ TEST(AddressToBindTest, WithoutKeysOrInsecureOnlyLoopbackIsAllowed) {
   EXPECT_THAT(address_to_bind({"*", "", true}), AnyOf("::", "0.0.0.0"));
 }
 
-TEST(AddressToBindTest, InvalidAddressesAndKeysWithInsecureAreRefused) {
+TEST(AddressToBindTest, InvalidAddressesAndTheCombinationOfKeysAndInsecureAreRefused) {
   for (const char* address : {"example.org", "", "1.2.3", "127.0.0.1:7600", "[::1]"}) {
     EXPECT_THAT(address_or_error({address, "", true}), HasSubstr("is not an address"));
   }
@@ -113,7 +113,7 @@ class AccessControlTest : public testing::Test {
 };
 
 TEST_F(AccessControlTest, AServerNeedsItsOwnKeyFileAndTheListBesideIt) {
-  EXPECT_THROW(control(), solver::InputError) << "there is no list";
+  EXPECT_THROW(control(), solver::InputError) << "a missing list of keys is an error";
   add("w");
   const AccessControl access = control();
   EXPECT_EQ(access.mode(), AccessMode::kKeys);
@@ -251,7 +251,7 @@ TEST(PeerAddressTest, AllPortsOfAnIpv4AddressAndAllAddressesOfAnIpv6NetworkAreOn
   EXPECT_NE(peer_address("2001:db8::1").source, peer_address("2001:db8:0:1::1").source);
 }
 
-TEST(ListenerTest, APeerOfTheSameFamilyHasItsAddress) {
+TEST(ListenerTest, TheAddressOfAPeerHasTheNotationOfItsFamily) {
   const Listener v4("127.0.0.1", "*");
   EXPECT_THAT(v4.endpoint(), StartsWith("tcp://127.0.0.1:"));
   EXPECT_THAT(address_of_peer(v4, "::ffff:127.0.0.1"), StartsWith("127.0.0.1:"));

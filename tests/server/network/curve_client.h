@@ -73,7 +73,7 @@ struct CurveClient {
     std::string sealed(kMacBytes + text.size(), '\0');
     if (crypto_box_easy(raw(sealed.data()), raw(text), text.size(), nonce_bytes.data(), to.data(),
                         from.data()) != 0) {
-      throw std::runtime_error("that key cannot encrypt");
+      throw std::runtime_error("a message cannot be encrypted with this key");
     }
     return sealed;
   }

@@ -66,10 +66,10 @@ class NetworkTest : public testing::Test {
   Incoming next(Network::Port port) {
     std::optional<Incoming> incoming;
     network_.collect(now_ms_);
-    run_until([&] { return (incoming = network_.next(port, anybody)).has_value(); });
+    run_until([&] { return (incoming = network_.next(port, any_identity)).has_value(); });
     return incoming ? std::move(*incoming) : Incoming{};
   }
-  static bool anybody(const std::string&) { return true; }
+  static bool any_identity(const std::string&) { return true; }
   std::uint64_t refused(RefusalCause cause) const {
     return network_.refusals().at(static_cast<std::size_t>(cause));
   }
@@ -169,7 +169,7 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   EXPECT_LE(std::find(first, bodies.end(), "second") - first, 2);
 }
 
-TEST_F(NetworkTest, APeerWithAnUntakenMessageIsNotRead) {
+TEST_F(NetworkTest, APeerIsNotReadUntilItsLastMessageIsTaken) {
   const auto flood = open_peer();
   const std::string frame = zmtp_frame(std::string(1 << 20, 'x'));
   std::size_t sent = 0;
@@ -180,10 +180,10 @@ TEST_F(NetworkTest, APeerWithAnUntakenMessageIsNotRead) {
   }
   EXPECT_LT(sent, 64U << 20U);
   EXPECT_EQ(network_.next(open_, [](const std::string&) { return false; }), std::nullopt);
-  EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
+  EXPECT_EQ(network_.next(keyed_, any_identity), std::nullopt);
 }
 
-TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndItIsReportedOnce) {
+TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndTheDisconnectIsReportedOnce) {
   const auto leaving = open_peer();
   leaving->send(zmtp_frame("first") + zmtp_frame("second") + zmtp_frame("last"));
   leaving->reset();
@@ -220,7 +220,7 @@ TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   run_until([&] { return network_.connections() == 0; });
 }
 
-TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected) {
+TEST_F(NetworkTest, PeersOfAnotherProtocolOrWithMessagesOfSeveralFramesAreDisconnected) {
   RawPeer stranger(network_.endpoint(open_));
   stranger.send("GET / HTTP/1.1\r\n\r\n");
   RawPeer in_parts(network_.endpoint(open_));
@@ -228,7 +228,8 @@ TEST_F(NetworkTest, APeerOfAnotherProtocolAndOneWithSeveralFramesAreDisconnected
   in_parts.send(zmtp_frame("part", true));
   std::size_t ended = 0;
   run_until([&] { return (ended += network_.take_disconnects().size()) == 2; });
-  EXPECT_EQ(refused(RefusalCause::kFaulty), 1U) << "the other one was admitted before";
+  EXPECT_EQ(refused(RefusalCause::kFaulty), 1U)
+      << "a fault after admission does not count as a refused handshake";
   stranger.read_to_the_end();
   in_parts.read_to_the_end();
 }
@@ -252,7 +253,7 @@ TEST_F(PausingNetworkTest, PeersThatSendTooFastAreNotReadAndLoseNothing) {
   std::size_t taken = 0;
   run_until([&] {
     update_most();
-    taken += network_.next(open_, anybody) ? 1U : 0U;
+    taken += network_.next(open_, any_identity) ? 1U : 0U;
     return taken == peers.size();
   });
   EXPECT_TRUE(network_.take_disconnects().empty());
@@ -318,7 +319,7 @@ TEST_F(TightNetworkTest, TheSumOfUnreadOutputIsBounded) {
   EXPECT_FALSE(network_.take_disconnects().empty());
 }
 
-TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected) {
+TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithTheMostInputIsDisconnected) {
   const auto modest = open_peer();
   modest->send(zmtp_frame(std::string(1000, 'm')));
   const auto greedy = open_peer();
@@ -332,7 +333,7 @@ TEST_F(TightNetworkTest, TheSumOfInputIsBoundedAndThePeerWithMostIsDisconnected)
   EXPECT_EQ(next().body, std::string(1000, 'm'));
 }
 
-TEST_F(TightNetworkTest, TheMostSilentConnectionMakesRoomUnlessAllAreActive) {
+TEST_F(TightNetworkTest, TheLongestSilentConnectionIsReplacedUnlessAllAreActive) {
   const auto quiet = open_peer();
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
@@ -420,7 +421,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   modest->tcp.send(first + modest->curve.sealed("second"));
   std::vector<std::string> bodies;
   run_until([&] {
-    while (const auto incoming = network_.next(keyed_, anybody)) {
+    while (const auto incoming = network_.next(keyed_, any_identity)) {
       bodies.push_back(incoming->body);
       EXPECT_TRUE(network_.has_more());  // most handshakes of the flood still wait
     }
@@ -451,62 +452,63 @@ TEST_F(NetworkTest, ForgedFramesEndTheirConnectionAndTheNextPeerIsServed) {
   forging->tcp.send(forged + forged);
   expect_message(*modest);
   run_until([&] {
-    EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
+    EXPECT_EQ(network_.next(keyed_, any_identity), std::nullopt);
     return network_.connections() == 1;
   });
 }
 
-class CrowdTest : public NetworkTest {
+class ManyPeersTest : public NetworkTest {
  protected:
-  CrowdTest() : NetworkTest({.handshakes = kMax}) {
+  ManyPeersTest() : NetworkTest({.handshakes = kMax}) {
     run_until([&] { return network_.connections() == kMax; });
   }
 
   static constexpr std::size_t kMax = 100;
-  std::vector<std::unique_ptr<KeyedPeer>> crowd_ = keyed_peers(300);
+  std::vector<std::unique_ptr<KeyedPeer>> peers_ = keyed_peers(300);
 };
 
-TEST_F(CrowdTest, AllSlowPeersOfALargeCrowdAreAdmitted) {
-  for (const auto& peer : crowd_) {
+TEST_F(ManyPeersTest, AllOfManySlowPeersAreAdmitted) {
+  for (const auto& peer : peers_) {
     peer->say_hello();
   }
-  for (const auto& peer : crowd_) {
+  for (const auto& peer : peers_) {
     take_welcome_and_initiate(*peer);
   }
-  for (const auto& peer : crowd_) {
+  for (const auto& peer : peers_) {
     static_cast<void>(received_by(*peer, 1));
   }
   EXPECT_EQ(all_refused(), 0U);
-  EXPECT_EQ(network_.connections(), crowd_.size());
+  EXPECT_EQ(network_.connections(), peers_.size());
 }
 
-TEST_F(CrowdTest, SilentPeersMakeRoomAfterAFractionOfTheirTime) {
+TEST_F(ManyPeersTest, SilentPeersAreReplacedAfterAFractionOfTheHandshakeTimeout) {
   now_ms_ += NetworkLimits().handshake_ms / 10;
   run_until([&] { return refused(RefusalCause::kBound) == kMax; });
   EXPECT_EQ(network_.connections(), kMax);
 }
 
-class CrowdOfOneAddressTest : public NetworkTest {
+class ManyPeersOfOneAddressTest : public NetworkTest {
  protected:
   static constexpr std::size_t kMax = 16;
-  CrowdOfOneAddressTest() : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
+  ManyPeersOfOneAddressTest()
+      : NetworkTest({.handshakes = 2 * kMax, .handshakes_of_source = kMax}) {}
 };
 
-TEST_F(CrowdOfOneAddressTest, DoesNotLockOutOthersAndReplacesItsOwnHandshakes) {
-  const auto crowd = keyed_peers(100, kElsewhere);
-  run_until([&] { return refused(RefusalCause::kBound) == crowd.size() - kMax; });
+TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndNoOthers) {
+  const auto peers = keyed_peers(100, kElsewhere);
+  run_until([&] { return refused(RefusalCause::kBound) == peers.size() - kMax; });
   EXPECT_EQ(network_.connections(), kMax);
   const auto other = admitted();
   expect_message(*other);
   now_ms_ += NetworkLimits().handshake_ms / 100;
   const auto second = admitted(kElsewhere);
-  EXPECT_EQ(network_.connections(), kMax + 1) << "in the place of one of the newest";
-  crowd[0]->say_hello();
-  take_welcome(*crowd[0]);
+  EXPECT_EQ(network_.connections(), kMax + 1) << "the peer replaced one of the newest handshakes";
+  peers[0]->say_hello();
+  take_welcome(*peers[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
   const auto silent = keyed_peers(1, kElsewhere);  // fills the place that `second` has left
   const auto third = admitted(kElsewhere);
-  EXPECT_EQ(crowd[0]->tcp.receive(), "") << "in the place of the oldest";
+  EXPECT_EQ(peers[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";
 }
 
 class TightKeyedNetworkTest : public NetworkTest {
@@ -514,7 +516,7 @@ class TightKeyedNetworkTest : public NetworkTest {
   TightKeyedNetworkTest() : NetworkTest({.connections = 7, .handshake_ms = 100}) {}
 };
 
-TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
+TEST_F(TightKeyedNetworkTest, AnAdmittedPeerIsNeverReplaced) {
   std::vector<std::unique_ptr<KeyedPeer>> peers(7);
   for (auto& peer : peers) {
     peer = admitted();
@@ -526,7 +528,7 @@ TEST_F(TightKeyedNetworkTest, APeerWithAKeyNeverMakesRoom) {
   EXPECT_EQ(network_.connections(), 7U);
 }
 
-TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedWhateverItsStep) {
+TEST_F(TightKeyedNetworkTest, ASlowHandshakeIsEndedAndCountedInEachOfItsSteps) {
   const auto peers = keyed_peers(2);  // the second peer stays silent
   peers[0]->say_hello();
   take_welcome(*peers[0]);
@@ -647,7 +649,7 @@ TEST_F(LibzmqPeersTest, ARevokedKeyEndsItsConnectionAndDropsItsMessages) {
   authenticator_.revoke(worker_.public_key);
   network_.admission_changed();
   EXPECT_EQ(network_.connections(), 1U);
-  EXPECT_EQ(network_.next(keyed_, anybody), std::nullopt);
+  EXPECT_EQ(network_.next(keyed_, any_identity), std::nullopt);
   EXPECT_EQ(refused(RefusalCause::kRevokedKey), 1U);
   const auto disconnects = network_.take_disconnects();
   ASSERT_EQ(disconnects.size(), 1U);

@@ -45,7 +45,7 @@ class RawPeer : public test::RawTcp {
   /// Sends all bytes; throws if the server has ended the connection.
   void send(std::string_view bytes) {
     if (!send_all(bytes)) {
-      throw std::runtime_error("the server takes no more");
+      throw std::runtime_error("the server accepts no more bytes");
     }
   }
   /// Sends as many bytes as the socket accepts without waiting; returns their number.

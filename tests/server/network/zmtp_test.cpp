@@ -192,11 +192,11 @@ TEST_F(CurveTest, APeerThatDoesNotHoldItsKeyIsRefusedWhetherOrNotTheKeyIsListed)
   const protocol::KeyPair other = protocol::generate_key_pair();
   std::set<std::string> faults;
   for (const protocol::KeyPair& shown : {own_, protocol::generate_key_pair()}) {
-    std::vector<CurveClient> thieves(3, {shown, server_.public_key});
-    thieves[0].vouching_secret = other.secret_key;
-    thieves[1].vouched_short_term = other.public_key;
-    thieves[2].vouched_server = other.public_key;
-    for (const CurveClient& client : thieves) {
+    std::vector<CurveClient> impostors(3, {shown, server_.public_key});
+    impostors[0].vouching_secret = other.secret_key;
+    impostors[1].vouched_short_term = other.public_key;
+    impostors[2].vouched_server = other.public_key;
+    for (const CurveClient& client : impostors) {
       Link thief = welcomed(client);
       thief.expect_refused(thief.initiate_frame());
       faults.insert(thief.zmtp.fault());

@@ -45,7 +45,7 @@ class PlanTest : public StoreFixture {
   }
   void edit(const std::string& sql) {
     database_.reset();
-    by_hand(sql);
+    execute_sql(sql);
     open();
   }
 
@@ -75,17 +75,17 @@ class PlanTest : public StoreFixture {
     }
     return values;
   }
-  std::vector<std::string> texts(const protocol::StudyQuery& asked) const {
-    return texts(plan(database_.get(), asked).sql);
+  std::vector<std::string> texts(const protocol::StudyQuery& query) const {
+    return texts(plan(database_.get(), query).sql);
   }
   /// Returns the output of EXPLAIN QUERY PLAN for a study query.
-  std::string steps_of(const protocol::StudyQuery& asked) const {
+  std::string steps_of(const protocol::StudyQuery& query) const {
     return fmt::format("{}", fmt::join(rows(database_.get(), "EXPLAIN QUERY PLAN " +
-                                                                 plan(database_.get(), asked).sql),
+                                                                 plan(database_.get(), query).sql),
                                        "; "));
   }
-  double number(const protocol::StudyQuery& asked) const {
-    Statement statement(database_.get(), plan(database_.get(), asked).sql);
+  double number(const protocol::StudyQuery& query) const {
+    Statement statement(database_.get(), plan(database_.get(), query).sql);
     return statement.step() ? statement.real(0) : -1.0;
   }
   double number(const std::string& select, const std::string& where = {}) const {
@@ -95,9 +95,9 @@ class PlanTest : public StoreFixture {
     return plan(database_.get(), question(select)).columns.at(0);
   }
   /// Returns the error message, or an empty text if the query is valid.
-  std::string error(const protocol::StudyQuery& asked) const {
+  std::string error(const protocol::StudyQuery& query) const {
     try {
-      plan(database_.get(), asked);
+      plan(database_.get(), query);
     } catch (const solver::InputError& error) {
       return error.what();
     }
@@ -127,7 +127,7 @@ TEST_F(PlanTest, AConditionCannotReachOtherStudies) {
   EXPECT_THAT(texts(of_other(question("DISTINCT study || study_id"))), ElementsAre("it's2"));
   edit("UPDATE studies SET recipe = x'ff'");
   EXPECT_THAT(texts(of_other(question("point", "mu > 0"))), ElementsAre("1", "2", "4"))
-      << "no ranges follow from a recipe that cannot be read";
+      << "an unreadable recipe gives no ranges";
 }
 
 TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
@@ -150,7 +150,7 @@ std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
   return columns;
 }
 
-TEST(UsualColumns, HaveEveryKeyWithSeveralValuesInTheStudyAndNoOther) {
+TEST(UsualColumns, ContainExactlyTheKeysThatVaryInTheStudy) {
   using protocol::listed;
   using protocol::recipe_of;
   const auto H = listed("H", {1});
@@ -161,13 +161,13 @@ TEST(UsualColumns, HaveEveryKeyWithSeveralValuesInTheStudyAndNoOther) {
                                      protocol::range("mu", 0, 1, 3), e}})),
               ElementsAre("mu", "E_Pa"));
   EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("H", {0.9}), mu, e}})), ElementsAre("H"))
-      << "from block to block";
+      << "H varies between blocks";
   EXPECT_THAT(usual_axes(recipe_of({{H, mu, e}, {listed("k", {1e7}), H, mu, e}})), ElementsAre("k"))
-      << "in one of the blocks";
+      << "k is set in only one of the blocks";
   EXPECT_THAT(usual_axes(recipe_of(
                   {{protocol::following("I", "A^2"), listed("length2", {0.3, 0.4}), H, mu, e}})),
               ElementsAre("I", "lengths_m"));
-  EXPECT_THAT(usual_axes({}), ElementsAre("H", "mu", "e")) << "of a recipe that cannot be read";
+  EXPECT_THAT(usual_axes({}), ElementsAre("H", "mu", "e")) << "an unreadable recipe";
 }
 
 TEST_F(PlanTest, FunctionsAggregateTheNumbersOfRows) {
@@ -188,8 +188,8 @@ TEST_F(PlanTest, CorrIsPearsonsCorrelationOfRowsWithBothValues) {
               1e-15);
   EXPECT_NEAR(number("corr(nullif(point, 9), nullif(point * point, 64))"),
               number("corr(point, point * point)", "point NOT IN (8, 9)"), 1e-15);
-  EXPECT_DOUBLE_EQ(number("corr(1e9 + point, -point)"), -1.0) << "without cancellation";
-  EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of them does not vary";
+  EXPECT_DOUBLE_EQ(number("corr(1e9 + point, -point)"), -1.0) << "large values caused cancellation";
+  EXPECT_DOUBLE_EQ(number("corr(point, 7) IS NULL"), 1.0) << "one of the values is constant";
 }
 
 TEST_F(PlanTest, ElementsEqualThoseOfTheListsInTheView) {
@@ -308,7 +308,7 @@ TEST_F(PlanTest, UnitsFollowFromThoseOfColumns) {
   }
 }
 
-TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
+TEST_F(PlanTest, AGroupedQuerySelectsOnlyKeysOrAggregates) {
   const std::pair<const char*, const char*> right[] = {
       {"major_mode, count(*), avg(fn_peak_N)", "major_mode"},
       {"round(mu, 1) AS m, max(fn_peak_N)", "m"},
@@ -341,7 +341,7 @@ TEST_F(PlanTest, ItemsOfAGroupAreKeysOrAggregates) {
 
 TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
   const struct {
-    protocol::StudyQuery asked;
+    protocol::StudyQuery query;
     const char* flag;
     const char* message;
   } wrong[] = {
@@ -361,8 +361,8 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
       {question("mu +"), "--select \"mu +\"", ""},
       {question("mu", "mu = = 1"), "--where", "near \"=\""},
       {question("mu", "", "", "mu DESC DESC"), "--order \"mu DESC DESC\"", ""}};
-  for (const auto& [asked, flag, message] : wrong) {
-    EXPECT_THAT(error(asked), AllOf(HasSubstr(flag), HasSubstr(message))) << asked.DebugString();
+  for (const auto& [query, flag, message] : wrong) {
+    EXPECT_THAT(error(query), AllOf(HasSubstr(flag), HasSubstr(message))) << query.DebugString();
   }
   for (const char* text : {"E > 1", "\"E\" > 1", "abs([E]) > 1", "e = 1 AND -E > 1"}) {
     EXPECT_THAT(error("mu", text), AllOf(HasSubstr("--where"), HasSubstr("write e, or E_Pa")))
@@ -381,7 +381,7 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
   EXPECT_THAT(error(unknown), HasSubstr("no study called \"b\""));
 }
 
-TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedOnes) {
+TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedNumbers) {
   // SQLite 3.40 parses each of these texts as a double next to the nearest one.
   for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
     EXPECT_EQ(number(typed), std::stod(typed));
@@ -396,7 +396,7 @@ TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedOnes) {
 }
 
 /// Returns the error message for a condition, or an empty text if the condition is allowed.
-std::string objection(const std::string& text) {
+std::string condition_error(const std::string& text) {
   try {
     check_sql_part("--where", text);
   } catch (const solver::InputError& error) {
@@ -413,7 +413,7 @@ TEST(SqlPart, ExpressionsAreAllowed) {
         "mu IS NOT DISTINCT FROM e", "\"mu\" > 1 AND [e] = 1 AND `k` > 2",
         "CASE WHEN mu > 1 THEN e ELSE H END > .5", "x'0aE1' = mode", "mode || ':x' = '?'",
         "mode->>'$[0]' = 1", "*", "count(*), max(mu) AS m", "mu DESC, e NULLS LAST"}) {
-    EXPECT_EQ(objection(text), "") << text;
+    EXPECT_EQ(condition_error(text), "") << text;
   }
 }
 
@@ -442,8 +442,8 @@ TEST(SqlPart, NothingCanChangeTheStatementAroundIt) {
       {"mu > 1 AND \xEF\xBB\xBFmu", "it has a byte-order mark"},
       {"mu > 1 AND (" + std::string(100'000, '1'), "--where \"mu > 1 AND (111"}};
   for (const auto& [text, message] : wrong) {
-    EXPECT_THAT(objection(text), HasSubstr(message)) << text;
-    EXPECT_LT(objection(text).size(), 1000U);
+    EXPECT_THAT(condition_error(text), HasSubstr(message)) << text;
+    EXPECT_LT(condition_error(text).size(), 1000U);
   }
 }
 

@@ -54,7 +54,7 @@ TEST(PointRanges, ListedValuesAreExact) {
   EXPECT_EQ(point_ranges(recipe, "H = 0.7"), Ranges());
 }
 
-TEST(PointRanges, OtherConditionsRestrictNothing) {
+TEST(PointRanges, ConditionsOtherThanComparisonsOfAxesRestrictNoPoints) {
   for (const char* condition :
        {"", "NOT H = 0.3", "H <> 0.3", "H = 0.3 = 1", "H + 0 = 0.3", "fn_peak_N > 3", "H = mu",
         "CASE WHEN mu > 1 AND H = 0.3 AND e = 1 THEN 1 END", "H = '0.3'", "H = 0x1",
@@ -65,7 +65,7 @@ TEST(PointRanges, OtherConditionsRestrictNothing) {
   }
 }
 
-TEST(PointRanges, AreFewInHugeStudies) {
+TEST(PointRanges, TheirNumberStaysSmallInHugeStudies) {
   const auto recipe = protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10'000), range("mu", 0.0, 1.0, 10'001), range("e", 0.1, 1.0, 9'999)}});
   EXPECT_EQ(points_in(point_ranges(recipe, "H = 0.1 AND mu = 0 AND e = 1")), 2U * 2 * 2);

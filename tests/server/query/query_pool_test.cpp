@@ -38,7 +38,8 @@ using testing::AnyOf;
 using testing::HasSubstr;
 
 /// In this query SQLite compares bytes for hours without checking for an interrupt.
-constexpr const char* kDeaf = "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
+constexpr const char* kUninterruptible =
+    "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
 /// The result of this query has several megabytes. A reader sends less than that before the client
 /// takes chunks.
@@ -66,7 +67,7 @@ class QueryPoolTest : public testing::Test {
     // No query has this number; the call only makes the pool check its clock.
     pool().cancel(UINT64_MAX);
   }
-  std::uint64_t ask(const std::string& sql, const std::string& client = "") {
+  std::uint64_t submit(const std::string& sql, const std::string& client = "") {
     QueryJob job{++last_ticket_, client.empty() ? std::to_string(last_ticket_) : client, {}};
     job.request.set_sql(sql);
     job.request.set_time_limit_ms(kTimeLimit_ms);
@@ -93,7 +94,7 @@ class QueryPoolTest : public testing::Test {
   Answer wait_until(std::uint64_t ticket, const Condition& condition) {
     std::unique_lock lock(mutex_);
     if (!changed_.wait_for(lock, test::kHangLimit, [&] { return condition(answers_[ticket]); })) {
-      throw std::runtime_error("the pool reports nothing");
+      throw std::runtime_error("the query pool reported nothing in time");
     }
     return answers_[ticket];
   }
@@ -123,10 +124,10 @@ class QueryPoolTest : public testing::Test {
     std::filesystem::permissions(settings_.reader_program, std::filesystem::perms::owner_all);
     return settings_.reader_program;
   }
-  std::string error_of(const std::string& sql) { return take_all(ask(sql)).error; }
+  std::string error_of(const std::string& sql) { return take_all(submit(sql)).error; }
   /// Returns the first value of the only row.
   std::int64_t number_of(const std::string& sql) {
-    const Answer answer = take_all(ask(sql));
+    const Answer answer = take_all(submit(sql));
     EXPECT_EQ(answer.rows, 1U) << answer.error;
     return answer.last_number;
   }
@@ -172,15 +173,15 @@ class QueryPoolTest : public testing::Test {
 TEST_F(QueryPoolTest, AReaderWhoseServerWasKilledDuringItsStartRunsNoQuery) {
   std::array<int, 2> ends{};
   ASSERT_EQ(pipe2(ends.data(), O_CLOEXEC), 0);
-  const protocol::Descriptor theirs(ends[1]);
+  const protocol::Descriptor reader_end(ends[1]);
   close(ends[0]);
   const protocol::Descriptor request(memfd_create("query", MFD_CLOEXEC));
   protocol::QueryRequest query;
-  query.set_sql(kDeaf);
+  query.set_sql(kUninterruptible);
   ASSERT_TRUE(query.SerializeToFileDescriptor(request.number()));
   ASSERT_EQ(lseek(request.number(), 0, SEEK_SET), 0);
   const pid_t pid =
-      start_reader(settings_.reader_program, path_, request.number(), theirs.number());
+      start_reader(settings_.reader_program, path_, request.number(), reader_end.number());
   int status = -1;
   EXPECT_EQ(waitpid(pid, &status, 0), pid);
   EXPECT_EQ(status, 0);
@@ -190,19 +191,19 @@ TEST_F(QueryPoolTest, AQueryIsAnsweredByAnotherProcess) {
   EXPECT_EQ(number_of("SELECT 5 AS five, 'x'"), 5);
   EXPECT_EQ(number_of("SELECT 7 /*" + std::string(900'000, 'x') + "*/"), 7);
   EXPECT_THAT(error_of("SELECT nothing"), HasSubstr("nothing"));
-  const Answer empty = take_all(ask("SELECT 1 WHERE 0"));
+  const Answer empty = take_all(submit("SELECT 1 WHERE 0"));
   EXPECT_EQ(empty.chunks, 1U);
   EXPECT_EQ(empty.rows, 0U);
 }
 
 TEST_F(QueryPoolTest, AQueryIsKilledAtItsDeadline) {
-  const auto deaf = ask(kDeaf);
-  wait_for_start(deaf);
+  const auto uninterruptible = submit(kUninterruptible);
+  wait_for_start(uninterruptible);
   advance_ms(kTimeLimit_ms - 1);
   EXPECT_EQ(number_of("SELECT 1"), 1);
-  EXPECT_FALSE(answer(deaf).ended);
+  EXPECT_FALSE(answer(uninterruptible).ended);
   advance_ms(1);
-  EXPECT_THAT(wait_for_end(deaf).error, HasSubstr("took more than 600 s"));
+  EXPECT_THAT(wait_for_end(uninterruptible).error, HasSubstr("took more than 600 s"));
   EXPECT_EQ(number_of("SELECT 1"), 1);
 }
 
@@ -225,10 +226,10 @@ TEST_F(QueryPoolTest, QueriesThatNeedTooMuchMemoryFailWithThatReason) {
 
 TEST_F(QueryPoolTest, AWaitingQueryStartsWhenACancelledOneEnds) {
   settings_.queue.most_running_each = 1;
-  const auto running = ask(kDeaf, "one client");
+  const auto running = submit(kUninterruptible, "one client");
   wait_for_start(running);
-  const auto next = ask("SELECT 2", "one client");
-  EXPECT_EQ(number_of("SELECT 1"), 1) << "of another client";
+  const auto next = submit("SELECT 2", "one client");
+  EXPECT_EQ(number_of("SELECT 1"), 1) << "a query of another client is not delayed";
   EXPECT_FALSE(answer(next).runs);
   pool().cancel(running);
   EXPECT_EQ(wait_for_end(next).last_number, 2);
@@ -237,9 +238,9 @@ TEST_F(QueryPoolTest, AWaitingQueryStartsWhenACancelledOneEnds) {
 
 TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
   for (int i = 0; i < 4; ++i) {
-    wait_for_start(ask(kDeaf));
+    wait_for_start(submit(kUninterruptible));
   }
-  ask(kDeaf);
+  submit(kUninterruptible);
   pool().stop();
   EXPECT_FALSE(pool().submit({99, "late", {}}));
 }
@@ -247,7 +248,7 @@ TEST_F(QueryPoolTest, StoppingWaitsForNoQuery) {
 TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
   use_script("printf '\\377\\377\\377\\377\\0\\0\\0\\0'\nexec sleep 1000");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process of the query ended"))
-      << "its frame is too long";
+      << "the reader sent a too long frame";
   const std::string program = use_script("exit 3");
   EXPECT_THAT(error_of("SELECT 1"), HasSubstr("the process of the query ended"));
   std::filesystem::remove(program);
@@ -257,7 +258,7 @@ TEST_F(QueryPoolTest, AReaderThatDiesIsReplaced) {
 }
 
 TEST_F(QueryPoolTest, ALongAnswerIsCompleteInLimitedChunks) {
-  const Answer answer = take_all(ask(kLong));
+  const Answer answer = take_all(submit(kLong));
   EXPECT_EQ(answer.error, "");
   EXPECT_EQ(answer.rows, 60'000U);
   EXPECT_EQ(answer.last_number, 60'000);
@@ -266,25 +267,25 @@ TEST_F(QueryPoolTest, ALongAnswerIsCompleteInLimitedChunks) {
   EXPECT_LT(answer.largest, (std::uint64_t{256} << 10U) + 4096);
 }
 
-TEST_F(QueryPoolTest, AClientThatConfirmsNothingGetsFourChunksAndLosesItsAnswerAfterTenSeconds) {
-  const auto ticket = ask(kLong);
+TEST_F(QueryPoolTest, WithoutConfirmationAClientGetsFourChunksAndItsAnswerEndsAfterTenSeconds) {
+  const auto ticket = submit(kLong);
   wait_for_chunks(ticket, kChunksAhead);
-  take_all(ask("SELECT 1"));
+  take_all(submit("SELECT 1"));
   EXPECT_EQ(answer(ticket).chunks, kChunksAhead);
   advance_ms(settings_.patience_ms - 1);
   pool().more(ticket, 1);
   wait_for_chunks(ticket, kChunksAhead + 1);
   advance_ms(settings_.patience_ms - 1);
-  take_all(ask("SELECT 1"));
+  take_all(submit("SELECT 1"));
   EXPECT_EQ(answer(ticket).chunks, kChunksAhead + 1);
   EXPECT_FALSE(answer(ticket).ended);
   advance_ms(1);
   EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("read no rows for 10 s"));
 }
 
-TEST_F(QueryPoolTest, AnAnswerHasALongestTime) {
+TEST_F(QueryPoolTest, AnAnswerEndsAtItsTimeLimit) {
   settings_.longest_answer_ms = 5000;
-  const auto ticket = ask(kLong);
+  const auto ticket = submit(kLong);
   wait_for_chunks(ticket, kChunksAhead);
   advance_ms(5000);
   EXPECT_THAT(wait_for_end(ticket).error, HasSubstr("took more than 5 s"));
@@ -347,7 +348,7 @@ TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
   ASSERT_TRUE(add("b", half));
   EXPECT_FALSE(add("c", std::string(1000, ' ')));
   queue_.remove(2);
-  EXPECT_TRUE(add("c", half)) << "b's query no longer waits";
+  EXPECT_TRUE(add("c", half)) << "the removed query takes no room";
   EXPECT_FALSE(add("d", half));
   start();
   EXPECT_TRUE(add("d", half)) << "running queries do not count";

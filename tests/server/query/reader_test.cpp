@@ -41,7 +41,7 @@ class ReaderTest : public StoreFixture {
   protocol::Row row_of(const std::string& sql) { return Reader(path_).query(sql, {}).rows.at(0); }
 };
 
-TEST_F(ReaderTest, ValuesHaveTheirTypes) {
+TEST_F(ReaderTest, ValuesKeepTheirSqliteTypes) {
   const auto reply = Reader(path_).query(
       "SELECT 1 AS i, 0.5 AS r, CAST(x'c3a9' AS TEXT) AS t, NULL AS n, x'0aff' AS b,"
       " CAST(x'ff' AS TEXT), CAST(x'eda080' AS TEXT), 'SC' LIKE 'sC', 'SC' LIKE 'S%' ESCAPE '!'",
@@ -60,17 +60,17 @@ TEST_F(ReaderTest, ValuesHaveTheirTypes) {
 
 TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
   Reader reader(path_);
-  const auto ask = [&](const std::string& study, const std::string& select) {
+  const auto first_chunk = [&](const std::string& study, const std::string& select) {
     protocol::QueryRequest request;
     request.mutable_question()->set_study(study);
     request.mutable_question()->add_select(select);
     return reader.answer(request, {}).next();
   };
-  const auto chunk = ask("a", "H, status");
+  const auto chunk = first_chunk("a", "H, status");
   EXPECT_EQ(chunk.chunk_rows(), 3U);
   EXPECT_THAT(chunk.units(), ElementsAre("m", ""));
-  EXPECT_THROW(ask("no such", "H"), solver::InputError);
-  EXPECT_THROW(ask("a", "median(status)"), QueryError);
+  EXPECT_THROW(first_chunk("no such", "H"), solver::InputError);
+  EXPECT_THROW(first_chunk("a", "median(status)"), QueryError);
 }
 
 TEST_F(ReaderTest, StatementsThatWriteReachOutsideOrAreWrongAreRefusedWithTheReason) {
@@ -134,7 +134,7 @@ TEST_F(ReaderTest, ARunningQueryCanBeInterrupted) {
 }
 
 TEST_F(ReaderTest, TheStatusOfStudiesIsDerivedFromTheRows) {
-  by_hand("INSERT INTO reused_points VALUES (1, 'x', 1), (1, 'y', 2), (2, 'y', 5)");
+  execute_sql("INSERT INTO reused_points VALUES (1, 'x', 1), (1, 'y', 2), (2, 'y', 5)");
   const auto all = Reader(path_).study_status();
   ASSERT_EQ(all.size(), 2U);
   EXPECT_EQ(all[0].name(), "a");

@@ -75,7 +75,7 @@ TEST_F(LeftOutPointsTest, ABatchWithOnlyLeftOutPointsIsAnAnswerAndNoLoss) {
   const SendBatch batch = bench.join(1, 1).at(0);
   const SendBatch next = only<SendBatch>(solve(bench, *table, batch)).at(0);
   EXPECT_GT(next.first_point(), batch.first_point());
-  EXPECT_GT(next.count(), batch.count()) << "it took no time";
+  EXPECT_GT(next.count(), batch.count()) << "batches grow because left-out points take no time";
   EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 0U);
 }
 

@@ -53,7 +53,7 @@ TEST(PointOrderTest, PointsWithTheSameFallFollowEachOther) {
   expect_each_point_once(table, order);
   const auto falls = runs_of_falls(table, order);
   EXPECT_EQ(falls.size(), 7U);
-  EXPECT_EQ(falls.front(), fall_of(table, 0)) << "in the order of their first points";
+  EXPECT_EQ(falls.front(), fall_of(table, 0)) << "falls are in the order of their first points";
   const Interval first = order.group_at(table, 0);
   EXPECT_EQ(first.begin, 0U);
   EXPECT_NE(fall_of(table, order.point(first.end - 1)), fall_of(table, order.point(first.end)));
@@ -124,7 +124,7 @@ TEST(PointOrderTest, PointsAddedByGrowthComeLast) {
                           listed("H", {1.0}), listed("mu", {0.1}), listed("e", {1.0})},
                          "");
   const PointTable grown(recipe);
-  EXPECT_EQ(order.place(101), 101U) << "until they are arranged";
+  EXPECT_EQ(order.place(101), 101U) << "new points keep their places until they are arranged";
   order.arrange(grown, 100, IntervalSet(100, 103), 1);
   expect_each_point_once(grown, order);
   EXPECT_EQ(order.point(101), 102U);

@@ -35,8 +35,8 @@ TEST(SchedulerPace, TheNewestBatchHasHalfOfTheWeight) {
   settings.first_batch_points = 100;
   SchedulerBench bench(table_of(1'000'000), settings);
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 1e-3);
-  EXPECT_EQ(second.count(), 100U) << "0.1 s at 1 ms a point";
-  EXPECT_EQ(bench.next_after(second, 3e-3).count(), 50U) << "0.1 s at 2 ms a point";
+  EXPECT_EQ(second.count(), 100U) << "0.1 s at 1 ms per point";
+  EXPECT_EQ(bench.next_after(second, 3e-3).count(), 50U) << "0.1 s at 2 ms per point";
 }
 
 TEST(SchedulerPace, AMessageIsWeightedByItsPointsSoThatOneFallChangesThePaceLittle) {
@@ -57,7 +57,7 @@ TEST(SchedulerPace, AMessageIsWeightedByItsPointsSoThatOneFallChangesThePaceLitt
   EXPECT_NEAR(static_cast<double>(next.count()), 0.1 / (0.299 / 1000), 5.0);
 }
 
-TEST(SchedulerPace, AnImplausiblyLongTimeIsCut) {
+TEST(SchedulerPace, AnImplausiblyLongTimeIsLimited) {
   SchedulerSettings settings = by_pace_alone();
   settings.first_batch_points = 100;
   SchedulerBench bench(table_of(1'000'000), settings);
@@ -67,12 +67,13 @@ TEST(SchedulerPace, AnImplausiblyLongTimeIsCut) {
 TEST(SchedulerPace, SlowPointsOfOneModelFillTheLanes) {
   SchedulerBench bench(table_of(1'000'000), by_pace_alone());
   const SendBatch second = bench.next_after(bench.join(1, 1).at(0), 0.5);
-  EXPECT_EQ(second.count(), 8U) << "0.5 s a point, and eight at a time take little longer than one";
+  EXPECT_EQ(second.count(), 8U)
+      << "0.5 s per point, and eight points together take little longer than one";
   const SendBatch third = bench.next_after(second, 5.0);
-  EXPECT_LT(third.count(), 4U) << "but not when they take minutes";
+  EXPECT_LT(third.count(), 4U) << "points that take minutes do not fill all lanes";
 }
 
-TEST(SchedulerPace, TheLastBatchesOfAStudyHaveAShortestDuration) {
+TEST(SchedulerPace, TheLastBatchesOfAStudyHaveAMinimumDuration) {
   SchedulerSettings settings = trusting();
   settings.shortest_batch_s = 0.01;
   SchedulerBench bench(table_of(1000), settings);
@@ -82,7 +83,7 @@ TEST(SchedulerPace, TheLastBatchesOfAStudyHaveAShortestDuration) {
     batch = bench.next_after(batch, 1e-4);
     counts.push_back(batch.count());
   }
-  EXPECT_GE(counts.at(counts.size() - 2), 100U) << "0.01 s at 0.1 ms a point";
+  EXPECT_GE(counts.at(counts.size() - 2), 100U) << "0.01 s at 0.1 ms per point";
   EXPECT_LT(counts.size(), 12U);
 }
 
@@ -112,8 +113,10 @@ std::uint64_t cut(const Interval& free, const BatchSize& wanted) {
 TEST(BatchCut, ABatchEndsWithAModelAndContainsAsManyAsFit) {
   EXPECT_EQ(cut({0, 90}, {.points = 12}), 10U);
   EXPECT_EQ(cut({0, 90}, {.points = 18, .most_points = 25}), 10U);
-  EXPECT_EQ(cut({8, 90}, {.points = 8, .most_points = 12}), 20U) << "two points would be few";
-  EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 29}), 32U) << "too many: it is shared";
+  EXPECT_EQ(cut({8, 90}, {.points = 8, .most_points = 12}), 20U)
+      << "the model has only two points left, so the next one is added";
+  EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 29}), 32U)
+      << "the rest of the model exceeds the limit and is divided";
   EXPECT_EQ(cut({20, 90}, {.points = 12, .most_points = 30}), 50U);
   EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 100}), 58U);
   EXPECT_EQ(cut({50, 90}, {.points = 3, .groups = 8, .most_points = 5}), 55U);
@@ -169,7 +172,7 @@ TEST(SchedulerModels, BatchesOfOnePointPerModelFillLanesEvenIfAFallExceedsTheTar
   for (int i = 0; i < 5; ++i) {
     batch = bench.next_after(batch, 30.0);
   }
-  EXPECT_EQ(batch.count(), 1U) << "a lost worker would cost minutes";
+  EXPECT_EQ(batch.count(), 1U) << "losing a worker with more points would cost minutes";
 }
 
 TEST(SchedulerModels, AtTheEndOfAStudyEveryWorkerHasPoints) {
@@ -193,7 +196,7 @@ TEST(SchedulerModels, ABatchEndsWithAModelIfPossible) {
     batch = bench.next_after(batch, 1e-3);
     whole += (batch.first_point() + batch.count()) % 9 == 0 ? 1U : 0U;
   }
-  EXPECT_GE(whole, 10U) << "at first too little is known of its pace";
+  EXPECT_GE(whole, 10U) << "only the first batches may end within a model";
 }
 
 TEST(SchedulerModels, ModelsOfManyPointsFillLanesUpToTheirLongestTime) {
@@ -202,7 +205,7 @@ TEST(SchedulerModels, ModelsOfManyPointsFillLanesUpToTheirLongestTime) {
   for (int i = 0; i < 20; ++i) {
     batch = bench.next_after(batch, 1e-4);
   }
-  EXPECT_EQ(batch.count(), 8000U) << "0.8 s, and eight falls side by side";
+  EXPECT_EQ(batch.count(), 8000U) << "0.8 s, and eight falls are solved together";
   for (int i = 0; i < 20; ++i) {
     batch = bench.next_after(batch, 5e-4);
   }
@@ -217,11 +220,12 @@ TEST(SchedulerModels, WorkersGetDifferentModelsWhileThereAreEnough) {
   }
   for (int round = 0; round < 10; ++round) {
     for (std::uint64_t i = 0; i < held.size(); ++i) {
-      EXPECT_EQ(model_of(held[i]), i) << "whose fall it has";
+      EXPECT_EQ(model_of(held[i]), i) << "the worker has the fall of its model in its cache";
       held[i] = bench.next_after(held[i], 1e-4);
     }
   }
-  EXPECT_EQ(model_of(bench.join(4, 1).at(0)), 0U) << "all models are begun: it helps with one";
+  EXPECT_EQ(model_of(bench.join(4, 1).at(0)), 0U)
+      << "a new worker joins a started model because no other is left";
 }
 
 TEST(SchedulerModels, AWorkerFinishesItsModelEvenIfAnotherHasPartOfIt) {
@@ -301,7 +305,7 @@ TEST(SchedulerFalls, EachFallOfASampleGoesToOneWorkerExceptAFewSharedOnes) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 20'000U);
 }
 
-TEST(SchedulerFalls, ARestartedServerLeasesTheRest) {
+TEST(SchedulerFalls, ARestartedServerLeasesTheRemainingPoints) {
   SchedulerBench bench;
   const IntervalSet completed = every(3, 2'000);
   bench.feed(StudyAdded{1, sample(2'000, 50), completed});
@@ -312,7 +316,7 @@ TEST(SchedulerFalls, ARestartedServerLeasesTheRest) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), 2'000U);
 }
 
-TEST(SchedulerFalls, PointsOfALostWorkerAreReturnedAndAFailedPointHasItsNumber) {
+TEST(SchedulerFalls, PointsOfALostWorkerAreLeasedAgainAndAFailedPointKeepsItsNumber) {
   SchedulerBench bench(sample(300, 4), trusting());
   const std::uint64_t failed = bench.join(1, 1).at(0).first_point();
   bench.feed(WorkerLeft{1});
@@ -353,7 +357,7 @@ TEST(ScatteredPointsTest, ABatchEndsBeforeLeasedPointsAndBeforeAWideGap) {
   }());
   EXPECT_EQ(take(points, {2}).end(), 5U);
   points.reopen(IntervalSet(0, 8));
-  EXPECT_EQ(take(points, {8}).end(), 3U) << "3 and 4 are still out";
+  EXPECT_EQ(take(points, {8}).end(), 3U) << "points 3 and 4 are still leased";
 
   StudyPoints sparse = points_without(1000, [] {
     IntervalSet completed(3, 500);
@@ -372,7 +376,8 @@ TEST(ScatteredPointsTest, ABatchContinuesWithAnotherModelOnlyIfAllItsPointsFit) 
       protocol::recipe_of({{protocol::listed("E", {6e10, 7e10}), protocol::listed("H", {1.0}),
                             protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
   StudyPoints points(StudyTable(table), every(2, 20), 0, LossLimits{});
-  EXPECT_EQ(take(points, {8}).end(), 10U) << "the other's fall is another worker's";
+  EXPECT_EQ(take(points, {8}).end(), 10U)
+      << "the fall of the second model belongs to another worker";
   StudyPoints both(StudyTable(table), every(2, 20), 0, LossLimits{});
   EXPECT_EQ(take(both, {18}).end(), 20U);
 }

@@ -68,14 +68,15 @@ TEST(SchedulerLosses, NewWorkersMustSolveAProbeWhileOthersAreLostWithPoints) {
   }
   const auto effects = bench.join_as("sound", 4, 2);
   EXPECT_TRUE(only<SendBatch>(effects).empty());
-  ASSERT_EQ(only<SendProbe>(effects).size(), 1U) << "one at a time";
+  ASSERT_EQ(only<SendProbe>(effects).size(), 1U) << "expected one probe";
   EXPECT_TRUE(bench.scheduler.worker(4, bench.now_ms).is_set_aside);
   EXPECT_FALSE(bench.scheduler.worker(4, bench.now_ms).is_proven);
   EXPECT_FALSE(only<SendBatch>(bench.solve_probe(only<SendProbe>(effects)[0])).empty());
   EXPECT_FALSE(bench.scheduler.worker(4, bench.now_ms).is_set_aside);
   EXPECT_TRUE(bench.scheduler.worker(4, bench.now_ms).is_proven);
   bench.pass(61'000, {4});
-  EXPECT_FALSE(bench.join(5, 1).empty()) << "it has been calm for a minute";
+  EXPECT_FALSE(bench.join(5, 1).empty())
+      << "after a minute without losses a new worker gets batches";
 }
 
 TEST(SchedulerLosses, AnUnsolvedProbeIsRepeatedEverySecond) {
@@ -94,7 +95,7 @@ TEST(SchedulerLosses, AProbeThatNeverArrivedIsSentAgain) {
   lose_newcomers(bench);
   const auto probe = only<SendProbe>(bench.join_as("sound", 4, 2)).at(0);
   bench.pass(2750, {4});
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {}}).empty()) << "it may be on its way";
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {}}).empty()) << "the probe may still be in transit";
   bench.pass(250, {4});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {probe.lease}}).empty());
   EXPECT_EQ(only<SendProbe>(bench.feed(HeartbeatReceived{4, {}})).size(), 1U);
@@ -114,7 +115,7 @@ TEST(SchedulerLosses, AHeartbeatWithLeaseZeroHoldsNoLease) {
   EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {0, batch.lease}}).empty());
   EXPECT_EQ(bench.scheduler.study(1).leased, 1U);
   bench.feed(HeartbeatReceived{1, {0}});
-  EXPECT_EQ(bench.scheduler.study(1).leased, 0U) << "the batch did not reach it";
+  EXPECT_EQ(bench.scheduler.study(1).leased, 0U) << "the batch did not reach the worker";
 }
 
 TEST(SchedulerLosses, ABatchThatCouldNotBeSentMakesNeitherPointsNorWorkerSuspect) {
@@ -143,8 +144,9 @@ TEST(SchedulerLosses, AWorkerHoldsAtMostTwoBatchesMoreThanItHasSolved) {
   const auto first = bench.join(1, 1000);
   ASSERT_EQ(first.size(), 2U);
   const auto second = only<SendBatch>(bench.solve(first[0]));
-  EXPECT_EQ(second.size(), 2U) << "three are with it";
-  EXPECT_EQ(only<SendBatch>(bench.solve(second.at(0))).size(), 2U) << "four are with it";
+  EXPECT_EQ(second.size(), 2U) << "the worker then holds three batches";
+  EXPECT_EQ(only<SendBatch>(bench.solve(second.at(0))).size(), 2U)
+      << "the worker then holds four batches";
 }
 
 TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe) {
@@ -208,7 +210,7 @@ TEST(SchedulerLosses, PointsAreNoLongerSuspectWhenTheirWorkersReturn) {
     EXPECT_EQ(only<SendBatch>(bench.join_as(std::to_string(worker), worker, 1)).size(), 1U);
     bench.feed(WorkerUnreachable{worker});
   }
-  EXPECT_TRUE(bench.join(3, 1).empty()) << "they are suspect, and this one is new";
+  EXPECT_TRUE(bench.join(3, 1).empty()) << "a new worker gets no suspect points";
   const auto given = bench.join_as("1", 4, 0);
   EXPECT_TRUE(only<SendBatch>(given).empty());
   EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{4, 1})).size(), 1U);
@@ -235,7 +237,7 @@ TEST(WorkerProcesses, TheLatestAbsentProcessesAreKept) {
     EXPECT_LE(processes.size(), 2U);
   }
   EXPECT_EQ(processes.join("process 98", 100), 195U);
-  EXPECT_EQ(processes.join("process 2", 101), 199U) << "it was forgotten";
+  EXPECT_EQ(processes.join("process 2", 101), 199U) << "the process was removed from the list";
 }
 
 // ---- Points that kill workers ----
@@ -387,7 +389,8 @@ TEST_F(SuspectTest, APointFailsAfterThreeProvenWorkersWereLostWithItAloneAndNone
     EXPECT_EQ(credit(worker).size(), 1U) << worker;
     EXPECT_TRUE(only<StoreFailure>(bench_.feed(WorkerUnreachable{worker})).empty());
   }
-  EXPECT_TRUE(only<StoreFailure>(bench_.pass(9750)).empty()) << "one may come back still";
+  EXPECT_TRUE(only<StoreFailure>(bench_.pass(9750)).empty())
+      << "one of the workers may still return";
   const auto failures = only<StoreFailure>(bench_.pass(250));
   ASSERT_EQ(failures.size(), 1U);
   EXPECT_EQ(failures[0].point, 3U);
@@ -402,7 +405,7 @@ TEST_F(SuspectTest, APointDoesNotFailWhenOneOfItsThreeWorkersReturns) {
   }
   bench_.pass(5000);
   const auto again = batches(bench_.join_as(name(2), 12, 1));
-  ASSERT_EQ(again.size(), 1U) << "it is still proven";
+  ASSERT_EQ(again.size(), 1U) << "the worker is still proven";
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(20'000, {12})).empty());
   bench_.solve_and_store(again[0]);
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
@@ -424,7 +427,7 @@ TEST_F(SuspectTest, RepeatedLossesOfOneProcessDoNotFailAPoint) {
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
 }
 
-TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherRisky) {
+TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherPointRisky) {
   prove(5, 2);
   for (WorkerId worker = 1; worker <= 5; ++worker) {
     bench_.feed(CreditGiven{worker, 2});
@@ -461,7 +464,7 @@ TEST(SchedulerSuspects, SuspectPointsGoToAProvenWorkerThatHoldsNothingElse) {
     bench.pass(3250);
   }
   const auto fresh = bench.join(3, 5);
-  ASSERT_EQ(fresh.size(), 2U) << "a newcomer gets others, and not too many";
+  ASSERT_EQ(fresh.size(), 2U) << "a new worker gets only two of the other batches";
   EXPECT_EQ(fresh[0].attempt, 1U);
   bench.solve(fresh[0]);
   const auto suspect = only<SendBatch>(bench.solve(fresh[1]));
@@ -483,13 +486,13 @@ TEST(SchedulerSuspects, ThePartsOfASplitIntervalStaySuspect) {
   for (const WorkerId worker : {3U, 4U}) {
     const auto probe = only<SendProbe>(bench.join_as("", worker, 2)).at(0);
     const auto part = only<SendBatch>(bench.solve_probe(probe));
-    ASSERT_EQ(part.size(), 1U) << "alone, although it asked for two";
+    ASSERT_EQ(part.size(), 1U) << "a suspect batch is sent alone although two were requested";
     EXPECT_EQ(part[0].count(), worker == 3 ? 4U : 1U);
     bench.feed(WorkerUnreachable{worker});
   }
 }
 
-TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
+TEST(SchedulerSuspects, ABusyWorkerFinishesItsBatchesBeforeItGetsSuspectPoints) {
   SchedulerBench bench(table_of(100'000));
   bench.join(1, 1);
   bench.pass(3250);
@@ -516,7 +519,7 @@ TEST(SchedulerSuspects, ABusyWorkerIsEmptiedForSuspectPoints) {
   EXPECT_TRUE(suspect_was_leased);
 }
 
-TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutAnswersGetsOnlyThree) {
+TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutResultsGetsOnlyThreeBatches) {
   prove(1, 1);
   auto effects = bench_.feed(CreditGiven{1, 1});
   int rounds = 0;

@@ -59,7 +59,8 @@ class StallTest : public testing::Test {
 };
 
 TEST_F(StallTest, AMinuteWithoutAResultEndsTheLeasesOfAWorker) {
-  EXPECT_TRUE(only<ReleaseBatch>(bench_.pass(kMinute_ms, {1})).empty()) << "too early";
+  EXPECT_TRUE(only<ReleaseBatch>(bench_.pass(kMinute_ms, {1})).empty())
+      << "the time limit is not yet reached";
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
   const auto effects = bench_.pass(1000, {1});
   const auto released = only<ReleaseBatch>(effects);
@@ -76,22 +77,23 @@ TEST_F(StallTest, PointsOfStalledWorkersAreNotSuspect) {
     bench_.feed(WorkerLeft{worker - 1});
     const auto batches = bench_.join(worker, 1);
     ASSERT_EQ(batches.size(), 1U);
-    EXPECT_EQ(batches[0].count(), 4U) << "they go out together";
+    EXPECT_EQ(batches[0].count(), 4U) << "the points are not suspect, so they are in one batch";
     EXPECT_EQ(batches[0].attempt, worker);
   }
 }
 
-TEST_F(StallTest, ItsLateResultsAreStoredOnce) {
+TEST_F(StallTest, LateResultsOfAStalledWorkerAreStoredOnce) {
   bench_.pass(kMinute_ms + 1000, {1});
   const auto again = bench_.join(2, 1);
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(only<StoreResults>(bench_.solve_and_store(batch_)).at(0).accepted.size(), 4U);
-  EXPECT_FALSE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside) << "it was slow";
+  EXPECT_FALSE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside)
+      << "a slow worker is not set aside";
   EXPECT_TRUE(only<StoreResults>(bench_.solve_and_store(again[0])).at(0).accepted.empty());
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
 
-TEST_F(StallTest, AWorkerThatStoresSomethingInTimeKeepsItsBatch) {
+TEST_F(StallTest, AWorkerThatDeliversAResultInTimeKeepsItsBatch) {
   for (std::uint64_t point = 0; point < 3; ++point) {
     bench_.pass(kMinute_ms - 1000, {1});
     bench_.feed(ResultsReceived{1, 1, batch_.lease, point + 1, false, 50.0, {{point, false}}});
@@ -120,7 +122,8 @@ TEST_F(StallTest, AStalledWorkerGetsAProbeAndThenTwoBatches) {
   bench_.feed(CreditGiven{1, 1024});
   const auto probe = only<SendProbe>(bench_.pass(kMinute_ms + 1000, {1}));
   ASSERT_EQ(probe.size(), 1U);
-  EXPECT_TRUE(only<SendBatch>(bench_.pass(kMinute_ms, {1})).empty()) << "it solves nothing";
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(kMinute_ms, {1})).empty())
+      << "the worker has not solved its probe";
   EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).size(), 2U);
 }
 
@@ -164,13 +167,14 @@ class StragglerTest : public StallTest {
 };
 
 TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
-  EXPECT_TRUE(only<SendBatch>(bench_.pass(750, {1, 2})).empty()) << "too early";
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(750, {1, 2})).empty())
+      << "the time limit is not yet reached";
   const SendBatch batch = second();
   EXPECT_EQ(batch.worker, 2U);
   EXPECT_EQ(batch.first_point(), 0U);
   EXPECT_EQ(batch.count(), 4U);
   EXPECT_EQ(batch.attempt, 2U);
-  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U) << "points count once";
+  EXPECT_EQ(bench_.scheduler.study(1).leased, 4U) << "points with two leases count once";
 }
 
 TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
@@ -184,7 +188,8 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
     bench.feed(WorkerUnreachable{id});
     bench.feed(StudyRemoved{id});
   }
-  EXPECT_TRUE(only<SendProbe>(bench.join_as("sound", 2, 2)).empty()) << "nothing is left";
+  EXPECT_TRUE(only<SendProbe>(bench.join_as("sound", 2, 2)).empty())
+      << "no point is free, so no probe is sent";
   std::vector<SendProbe> probes;
   std::vector<SendBatch> batches;
   for (int i = 0; i < 8 && batches.empty(); ++i) {
@@ -216,10 +221,10 @@ TEST_F(StragglerTest, TheFirstAnswerWinsAndTheOtherWorkerIsReleased) {
   EXPECT_EQ(released[0].worker, 1U);
   EXPECT_EQ(released[0].lease, batch_.lease);
   const auto late = only<StoreResults>(answer(batch_, {0, 1, 2, 3}, true));
-  EXPECT_TRUE(late.at(0).accepted.empty()) << "what comes late is stored once only";
+  EXPECT_TRUE(late.at(0).accepted.empty()) << "a late result was stored again";
 }
 
-TEST_F(StragglerTest, TheStragglerMayWinToo) {
+TEST_F(StragglerTest, TheSlowWorkerMayAnswerFirst) {
   const SendBatch batch = second();
   answer(batch, {0}, false);
   const auto released = only<ReleaseBatch>(answer(batch_, {0, 1, 2, 3}, true));
@@ -238,7 +243,7 @@ TEST_F(StragglerTest, PointsStayLeasedWhileOneOfTheTwoWorkersHasThem) {
   EXPECT_EQ(batch.worker, 2U);
 }
 
-TEST_F(StragglerTest, AWorkerDoesNotGetItsOwnBatchTwiceNorAThirdWorkerOne) {
+TEST_F(StragglerTest, ABatchGoesToAtMostTwoDifferentWorkers) {
   second();
   bench_.feed(CreditGiven{1, 1});
   bench_.join(3, 1);
@@ -280,11 +285,13 @@ TEST_F(StragglerTest, AHarmfulBatchIsFoundAlthoughTwoWorkersHeldIt) {
   second();
   bench_.feed(WorkerUnreachable{1});
   bench_.join(3, 1);
-  EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty()) << "not given to a third worker";
+  EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty())
+      << "the batch was sent to a third worker";
   const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
   // Two workers are lost, so the points are suspect and need a proven worker.
   ASSERT_EQ(probe.size(), 1U);
-  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U) << "split";
+  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U)
+      << "suspect points are sent one by one";
 }
 
 TEST_F(StragglerTest, ForgettingAFailureEndsALeaseThatContainsThePoint) {
@@ -299,7 +306,7 @@ TEST_F(StragglerTest, ForgettingAFailureEndsALeaseThatContainsThePoint) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, again[0].count());
 }
 
-TEST_F(StragglerTest, ACancellationReturnsThePointsOfTwinLeases) {
+TEST_F(StragglerTest, ACancellationReturnsThePointsOfBothLeasesOfABatch) {
   second();
   ASSERT_EQ(bench_.scheduler.worker(2, bench_.now_ms).leased_points, batch_.count());
   EXPECT_EQ(only<WithdrawStudy>(bench_.feed(StudyCancelled{1})).size(), 2U);

@@ -42,7 +42,7 @@ TEST(SchedulerShare, AStudyOfAHigherPriorityComesFirst) {
   EXPECT_EQ(shares(bench, 10).at(1), 10);
 }
 
-TEST(SchedulerShare, AStudyThatOpensLaterOrAgainDoesNotCatchUp) {
+TEST(SchedulerShare, AStudyThatOpensLaterOrAgainGetsNoExtraBatches) {
   for (const bool is_reopened : {false, true}) {
     SchedulerBench bench(table_of(1'000'000), trusting());
     StudyAdded other{2, table_of(1'000'000), {}};
@@ -65,7 +65,7 @@ TEST(SchedulerShare, ForgottenFailuresAreFreeAgainAndOthersStayCompleted) {
   IntervalSet completed(0, 10);
   bench.feed(StudyAdded{1, table_of(10), completed, 3});
   bench.feed(WorkerJoined{1, 1});
-  EXPECT_TRUE(shares(bench, 1).empty()) << "all is completed";
+  EXPECT_TRUE(shares(bench, 1).empty()) << "all points are completed";
   IntervalSet failures(2, 4);
   failures.insert(7);
   const auto batches = only<SendBatch>(bench.feed(FailuresForgotten{1, failures}));
@@ -117,7 +117,7 @@ TEST(SchedulerReuse, LeasedPointsAreReusedTooAndTheirBatchIsReleased) {
   EXPECT_EQ(bench.scheduler.study(1).solved(), second.count() + 5);
 }
 
-TEST(SchedulerReuse, AHeldStudyCanBePausedCancelledAndReopened) {
+TEST(SchedulerReuse, AStudyCanBePausedCancelledAndReopenedDuringItsLookup) {
   SchedulerBench bench;
   bench.feed(held_study(10));
   EXPECT_THAT(bench.join(1, 4), IsEmpty());
@@ -167,7 +167,7 @@ TEST(SchedulerGrowthTest, AfterGrowthAWorkerGetsTheRecipeOnceBeforeItsNextBatch)
   EXPECT_TRUE(std::holds_alternative<DefineStudy>(old[0]));
   const auto further = bench.feed(CreditGiven{1, 1});
   EXPECT_GE(only<SendBatch>(further).at(0).first_point(), 10U);
-  EXPECT_TRUE(only<DefineStudy>(further).empty()) << "told once";
+  EXPECT_TRUE(only<DefineStudy>(further).empty()) << "the definition was sent twice";
 }
 
 TEST(SchedulerGrowthTest, ResultsOfAnEarlierBatchCountAfterGrowth) {
@@ -227,7 +227,7 @@ TEST(SchedulerRemovalTest, ResultsOfADeletedStudyAreDroppedAndAcknowledged) {
       only<AcknowledgeResults>(bench.feed(ResultsStored{1, 1, stores[0].sequence, {}})).size(), 1U);
 }
 
-TEST(SchedulerRemovalTest, ResultsBeingWrittenAreAcknowledged) {
+TEST(SchedulerRemovalTest, ResultsThatAreBeingWrittenDuringADeletionAreAcknowledged) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   const auto store = only<StoreResults>(bench.solve(batch)).at(0);
@@ -237,7 +237,7 @@ TEST(SchedulerRemovalTest, ResultsBeingWrittenAreAcknowledged) {
   EXPECT_TRUE(only<StudyFinished>(effects).empty());
 }
 
-TEST(SchedulerRemovalTest, LossesOfItsPointsAreForgotten) {
+TEST(SchedulerRemovalTest, LossesOfPointsOfADeletedStudyAreForgotten) {
   SchedulerBench bench(table_of(1));
   // Six processes are lost with batches, so the scheduler stores losses for points of both studies.
   bench.feed(StudyAdded{2, table_of(1000), {}});

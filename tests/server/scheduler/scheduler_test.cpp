@@ -189,7 +189,7 @@ TEST(SchedulerTest, ACancelledStudyIsWithdrawnAndGetsNoMoreBatches) {
   EXPECT_TRUE(bench.feed(StudyCancelled{1}).empty());
 }
 
-TEST(SchedulerTest, AReopenedStudyIsDefinedAgain) {
+TEST(SchedulerTest, TheDefinitionOfAReopenedStudyIsSentAgain) {
   SchedulerBench bench(table_of(100));
   const auto batch = bench.join(1, 1).at(0);
   bench.feed(StudyCancelled{1});
@@ -261,7 +261,7 @@ TEST(SchedulerTest, ResultsOfAnUnknownStudyAreAcknowledgedSoThatTheWorkerDropsTh
 
 // ---- Batches that a worker returns unsolved ----
 
-TEST(SchedulerTest, AReturnedBatchIsFreeAtOnceAndNoLoss) {
+TEST(SchedulerTest, AReturnedBatchIsFreeAtOnceAndCountsAsNoLoss) {
   SchedulerBench bench(table_of(100), trusting());
   const SendBatch batch = only<SendBatch>(bench.join_as("a", 1, 1)).at(0);
   ASSERT_GT(batch.count(), 1U);
@@ -310,13 +310,13 @@ TEST(SchedulerTest, AReturnedSuspectPointStaysSuspect) {
   bench.feed(WorkerUnreachable{2});
   auto effects = bench.join_as("c", 3, 2);
   const auto probes = only<SendProbe>(effects);
-  ASSERT_EQ(probes.size(), 1U) << "it goes to proven workers only";
+  ASSERT_EQ(probes.size(), 1U) << "a returned suspect point goes only to proven workers";
   effects = bench.solve_probe(probes[0]);
   const auto batches = only<SendBatch>(effects);
   ASSERT_EQ(batches.size(), 1U);
   bench.feed(BatchesReturned{3, {batches[0].lease}});
   effects = bench.join_as("d", 4, 1);
-  EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker gets it";
+  EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker got the suspect point";
 }
 
 TEST(SchedulerTest, AReturnedProbeIsSentAgain) {
@@ -335,9 +335,9 @@ TEST(SchedulerTest, AReturnedProbeIsSentAgain) {
 constexpr WorkerId kWorkers = 1000;
 
 /// Provides a thousand workers that have requested batches while no study is open.
-class IdleCrowd : public testing::Test {
+class IdleWorkers : public testing::Test {
  protected:
-  IdleCrowd() {
+  IdleWorkers() {
     for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
       scheduler_.handle(WorkerJoined{worker, 1}, now_ms_);
       scheduler_.handle(CreditGiven{worker, 2}, now_ms_);
@@ -351,7 +351,7 @@ class IdleCrowd : public testing::Test {
   std::int64_t now_ms_ = 1'000'000;
 };
 
-TEST_F(IdleCrowd, AMessageOfOneWorkerExaminesNoOther) {
+TEST_F(IdleWorkers, AMessageOfOneWorkerExaminesNoOther) {
   const std::uint64_t before = scheduler_.examined_workers();
   for (WorkerId worker = 1; worker <= kWorkers; ++worker) {
     scheduler_.handle(HeartbeatReceived{worker, {}}, now_ms_);
@@ -360,12 +360,12 @@ TEST_F(IdleCrowd, AMessageOfOneWorkerExaminesNoOther) {
   scheduler_.check_invariants();
 }
 
-TEST_F(IdleCrowd, WorkersAreServedInTheOrderOfTheirRequests) {
+TEST_F(IdleWorkers, WorkersAreServedInTheOrderOfTheirRequests) {
   scheduler_.handle(HeartbeatReceived{500, {}}, now_ms_);
   EXPECT_EQ(only<SendBatch>(add_study()).at(0).worker, 1U);
 }
 
-TEST(ManyStudies, WithoutOpenPointsCostDispatchNothing) {
+TEST(ManyStudies, WithoutOpenPointsDoNotSlowDispatch) {
   const auto cost_with = [](StudyId resting) {
     Scheduler scheduler(trusting());
     for (StudyId study = 1; study <= resting; ++study) {

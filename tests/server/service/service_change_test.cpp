@@ -70,21 +70,21 @@ TEST_F(ServiceTest, WhenTheDatabaseIsGoneNothingIsAcknowledgedAndAllPeersAreNoti
   ports_.worker_messages.clear();
   service_->written({WriteReport::Kind::kGone, 0, "the file was deleted"}, now_);
   EXPECT_TRUE(service_->storage_is_gone());
-  EXPECT_THAT(last_error(), HasSubstr("the file was deleted")) << "who waited";
+  EXPECT_THAT(last_error(), HasSubstr("the file was deleted")) << "the waiting client is notified";
   ASSERT_EQ(ports_.worker_messages.size(), 2U);
   EXPECT_EQ(ports_.worker_messages[0].notice().text(), "the file was deleted");
   EXPECT_TRUE(ports_.worker_messages[1].has_stopping());
 
   ports_.jobs.clear();
   ports_.worker_messages.clear();
-  worker_says(results_of({0}));
+  worker_sends(results_of({0}));
   credit(1);
   service_->tick(now_);
   EXPECT_TRUE(ports_.jobs.empty());
-  EXPECT_TRUE(ports_.worker_messages.empty()) << "the worker keeps its results";
-  for (const auto& asked :
+  EXPECT_TRUE(ports_.worker_messages.empty()) << "results were acknowledged without a database";
+  for (const auto& late_request :
        {submit_request("c"), change_request("a", protocol::STUDY_CHANGE_PAUSE)}) {
-    request(asked);
+    request(late_request);
     EXPECT_THAT(last_error(), HasSubstr("the file was deleted"));
   }
   EXPECT_EQ(status_of("a").waits_for(), "the file was deleted");
@@ -118,13 +118,14 @@ TEST_F(ServiceTest, AStudyThatIsDoneWhileAPauseIsWrittenStaysDone) {
   request(change_request("a", protocol::STUDY_CHANGE_PAUSE));
   auto pause = std::exchange(ports_.jobs, {});
   answer_batch(1);
-  ASSERT_EQ(ports_.jobs.size(), 1U) << "that it is done";
+  ASSERT_EQ(ports_.jobs.size(), 1U) << "expected a change to `done`";
   ports_.jobs.insert(ports_.jobs.begin(), pause.front());
   write_all();
-  EXPECT_EQ(status_of("a").state(), "done") << "points handed out before are still stored";
+  EXPECT_EQ(status_of("a").state(), "done")
+      << "results of points leased before the pause are still stored";
 }
 
-TEST_F(ServiceTest, ARefusedChangeHasNoEffectButMakesTheStateDoubtful) {
+TEST_F(ServiceTest, ARefusedChangeHasNoEffectAndTheStateIsStoredAgain) {
   submit("a");
   for (const auto change : {protocol::STUDY_CHANGE_PAUSE, protocol::STUDY_CHANGE_CANCEL}) {
     request(change_request("a", change));
@@ -192,7 +193,7 @@ TEST_F(ServiceGrowthTest, FurtherBlocksAreAppendedWhenTheyAreDurable) {
   ASSERT_EQ(ports_.replies.size(), 2U);
   EXPECT_EQ(ports_.replies[0].submit().appended(), 5U);
   EXPECT_EQ(ports_.replies[0].submit().was(), "running");
-  EXPECT_EQ(ports_.replies[1].submit().appended(), 0U) << "the points are there already";
+  EXPECT_EQ(ports_.replies[1].submit().appended(), 0U) << "the second request appends no points";
   for (const ClientReply& reply : ports_.replies) {
     EXPECT_EQ(reply.submit().points(), 15U);
     EXPECT_EQ(reply.submit().study_id(), 1U);
@@ -227,11 +228,11 @@ TEST_F(ServiceGrowthTest, AStudyWhoseLastPointIsStoredWhileItGrowsIsDoneOnlyIfTh
     grow("a", 1, 1);
     auto growth = std::exchange(ports_.jobs, {});
     answer_batch(UINT64_MAX);
-    EXPECT_TRUE(ports_.jobs.empty()) << "it is not called done";
+    EXPECT_TRUE(ports_.jobs.empty()) << "a growing study must not become done";
     ports_.jobs = std::move(growth);
     write_all(error);
     EXPECT_EQ(last_error().empty(), error.empty());
-    EXPECT_EQ(ports_.jobs.size(), error.empty() ? 0U : 1U) << "that it is done";
+    EXPECT_EQ(ports_.jobs.size(), error.empty() ? 0U : 1U) << "expected a change to `done`";
     EXPECT_EQ(status_of("a").state(), error.empty() ? "running" : "done");
     EXPECT_EQ(status_of("a").points(), error.empty() ? 2U : 1U);
     ports_.jobs.clear();
@@ -259,7 +260,8 @@ TEST_F(ServiceGrowthTest, ARenamedStudyIsFoundByItsNewNameAndByItsNumber) {
   by_number.mutable_status()->set_study("a");
   by_number.mutable_status()->set_study_id(1);
   request(by_number);
-  EXPECT_EQ(last_reply().status().studies(0).name(), "b") << "a client that watches it goes on";
+  EXPECT_EQ(last_reply().status().studies(0).name(), "b")
+      << "a watching client finds the study by its number";
   submit("a", 3);
   EXPECT_TRUE(last_reply().submit().created()) << "the old name is free";
 }
@@ -315,20 +317,20 @@ TEST_F(ServiceGrowthTest, ADeletedStudyIsGoneAndItsNameIsFree) {
   write_all();
   EXPECT_TRUE(last_reply().submit().created());
   EXPECT_EQ(last_reply().submit().study_id(), 2U);
-  worker_says(solved_before);
+  worker_sends(solved_before);
   ASSERT_EQ(ports_.jobs.size(), 1U);
   EXPECT_TRUE(std::get<AddResults>(ports_.jobs[0].change).results.empty());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
   EXPECT_EQ(service_->scheduler().study(2).completed, 0U);
   remove("a", 1);
-  EXPECT_EQ(last_reply().change().study().state(), "deleted") << "it is deleted already";
-  EXPECT_TRUE(ports_.jobs.empty()) << "the new study of that name stays";
+  EXPECT_EQ(last_reply().change().study().state(), "deleted") << "the study is already deleted";
+  EXPECT_TRUE(ports_.jobs.empty()) << "the new study of that name was deleted";
   remove("a", 77);
   EXPECT_THAT(last_error(), HasSubstr("study name \"a\" and study number do not match"));
 }
 
-TEST_F(ServiceGrowthTest, TheRecipeOfAStudyIsDescribed) {
+TEST_F(ServiceGrowthTest, DescribeReturnsTheRecipeOfAStudy) {
   submit("friction", 10);
   ClientRequest describe = client_request(7);
   describe.mutable_describe()->set_study("friction");
@@ -407,7 +409,7 @@ TEST_F(ServiceKeysTest, OpenStudiesAndTheirPointsAreLimited) {
   }
   EXPECT_THAT(error_of(submit_request("f", 1)),
               HasSubstr("5 studies are open, and at most 5 are allowed:"));
-  EXPECT_EQ(error_of(submit_request("a", 600)), "") << "it is open already";
+  EXPECT_EQ(error_of(submit_request("a", 600)), "") << "the study is already open";
 }
 
 TEST_F(ServiceKeysTest, ACancelledStudyMakesRoomAndIsNotResumedBeyondTheLimits) {

@@ -34,7 +34,9 @@ class FakePorts final : public Ports {
     return identity == busy ? Delivery::kBusy : Delivery::kSent;
   }
   bool is_busy(const std::string& identity) const override { return identity == busy; }
-  bool has_unread_input(const std::string& identity) const override { return identity == unheard; }
+  bool has_unread_input(const std::string& identity) const override {
+    return identity == with_unread_input;
+  }
   bool to_client(const std::string& identity, const std::string& frame) override {
     if (identity == unreachable) {
       return false;
@@ -56,7 +58,7 @@ class FakePorts final : public Ports {
 
   std::string unreachable;
   std::string busy;
-  std::string unheard;
+  std::string with_unread_input;
   std::vector<ServerToWorker> worker_messages;
   std::vector<ClientReply> replies;
   std::vector<WriteJob> jobs;
@@ -166,7 +168,7 @@ class ServiceTest : public testing::Test {
                                : batch.study_id() == 0 ? solved_point(i)  // a probe
                                                        : solved(i, batch.study_id());
     }
-    worker_says(message, identity);
+    worker_sends(message, identity);
     write_all();
   }
   /// Returns a worker's result for a point.
@@ -186,7 +188,7 @@ class ServiceTest : public testing::Test {
     }
     return message;
   }
-  void worker_says(const WorkerMessage& message, const std::string& identity = "worker") {
+  void worker_sends(const WorkerMessage& message, const std::string& identity = "worker") {
     service_->worker_frame(identity, protocol::encode(message), now_);
     service_->scheduler().check_invariants();
   }
@@ -200,12 +202,12 @@ class ServiceTest : public testing::Test {
     protocol::set_protocol(*message.mutable_hello());
     message.mutable_hello()->set_solver_version(solver);
     message.mutable_hello()->set_threads(1);
-    worker_says(message, identity);
+    worker_sends(message, identity);
   }
   void credit(std::uint32_t batches, const std::string& identity = "worker") {
     WorkerMessage message;
     message.mutable_credit()->set_batches(batches);
-    worker_says(message, identity);
+    worker_sends(message, identity);
   }
   protocol::StatusReply statuses(std::uint64_t after = 0, std::uint32_t limit = 0) {
     ClientRequest message = client_request();

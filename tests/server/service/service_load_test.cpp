@@ -40,7 +40,7 @@ TEST_F(ServiceLoadTest, NoBatchIsSentWhileTheDiskIsFarBehind) {
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
   for (std::uint64_t point = 900; point < 910; ++point) {
-    worker_says(results_of({point}));
+    worker_sends(results_of({point}));
   }
   credit(1);
   EXPECT_EQ(batches_sent(), 1U);
@@ -48,11 +48,11 @@ TEST_F(ServiceLoadTest, NoBatchIsSentWhileTheDiskIsFarBehind) {
   EXPECT_EQ(batches_sent(), 2U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerThatIsNotReadIsNotSilentAndGetsSignsOfLife) {
+TEST_F(ServiceLoadTest, WhileReadingIsPausedAWorkerIsNotLostAndGetsHeartbeatReplies) {
   ServiceSettings settings;
   settings.ledger.bytes = 1;
   begin(settings);
-  worker_says(results_of({900}));
+  worker_sends(results_of({900}));
   ports_.worker_messages.clear();
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 1U);
@@ -63,28 +63,29 @@ TEST_F(ServiceLoadTest, AWorkerThatIsNotReadIsNotSilentAndGetsSignsOfLife) {
   EXPECT_GE(signs, 5U);
   write_all();
   pass(10'000);
-  EXPECT_EQ(service_->scheduler().workers(), 0U) << "now it is silent indeed";
+  EXPECT_EQ(service_->scheduler().workers(), 0U)
+      << "a worker that is silent while it is read is lost";
 }
 
-TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotSilent) {
+TEST_F(ServiceLoadTest, AWorkerWithUnreadMessagesIsNotLost) {
   begin({});
-  ports_.unheard = "worker";
+  ports_.with_unread_input = "worker";
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 1U);
-  ports_.unheard.clear();
+  ports_.with_unread_input.clear();
   pass(10'000);
   EXPECT_EQ(service_->scheduler().workers(), 0U);
 }
 
-TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsSignsOfLife) {
+TEST_F(ServiceLoadTest, AWorkerWhoseResultsWaitForTheDiskGetsHeartbeatReplies) {
   begin({});
   ports_.worker_messages.clear();
   for (std::uint64_t point = 900; point < 960; ++point) {
     now_.steady_ms += 100;
-    worker_says(results_of({point}));
+    worker_sends(results_of({point}));
     service_->tick(now_);
   }
-  EXPECT_GE(ports_.worker_messages.size(), 4U) << "one in 1.2 s";
+  EXPECT_GE(ports_.worker_messages.size(), 4U) << "expected one heartbeat reply every 1.2 s";
   EXPECT_LE(ports_.worker_messages.size(), 6U);
 }
 
@@ -118,7 +119,7 @@ TEST_F(FloodedServiceTest, NoWorkerJoinsWhileTheDiskIsTooFarBehind) {
   message.mutable_results()->set_study_id(1);
   for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
     message.mutable_results()->set_sequence(sequence);
-    worker_says(message);
+    worker_sends(message);
   }
   hello("another");
   EXPECT_EQ(service_->scheduler().workers(), 1U);
@@ -172,8 +173,9 @@ TEST_F(WriteLedgerTest, EachWriteHasOneOutcome) {
   write_change();
   write_change();
   ASSERT_EQ(ports_.jobs.size(), 3U);
-  EXPECT_FALSE(ports_.jobs[0].answer_failure) << "results are tried until they are stored";
-  EXPECT_TRUE(ports_.jobs[1].answer_failure) << "a client waits";
+  EXPECT_FALSE(ports_.jobs[0].answer_failure)
+      << "writing results is repeated until they are stored";
+  EXPECT_TRUE(ports_.jobs[1].answer_failure) << "a client waits for the outcome";
   ledger_.end(ports_.jobs[1].ticket, std::nullopt, now_);
   ledger_.end(ports_.jobs[2].ticket, "the disk is full", now_);
   ledger_.end(ports_.jobs[0].ticket, std::nullopt, now_);
@@ -237,7 +239,7 @@ TEST_F(WriteLedgerTest, ResultsAndChangesOfClientsHaveSeparateLimits) {
   ledger_.write(
       AddStudy{1, "a", StudyTable(std::string(limits::kUnstoredBytesOfChanges, 'x'), 1), ""}, {},
       [](const std::string&, Instant) {});
-  EXPECT_FALSE(ledger_.has_room_for_changes()) << "recipes count, too";
+  EXPECT_FALSE(ledger_.has_room_for_changes()) << "recipes count as unstored bytes";
 }
 
 TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
@@ -250,7 +252,7 @@ TEST_F(WriteLedgerTest, WhenTheDatabaseIsGoneAllWritesAreRefused) {
   EXPECT_TRUE(ledger_.holds_batches());
   EXPECT_EQ(ledger_.fault(), "the file was deleted");
   store_first();
-  EXPECT_EQ(outcomes_.size(), 1U) << "a late report";
+  EXPECT_EQ(outcomes_.size(), 1U) << "a late report has no effect";
 }
 
 }  // namespace

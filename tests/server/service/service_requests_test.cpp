@@ -56,10 +56,10 @@ TEST_F(ServiceTest, WaitingLongRequestsAreLimited) {
   EXPECT_THAT(last_error(), HasSubstr("try again later"));
   run_checks();
   request(long_submission("b", kLongRequest));
-  EXPECT_EQ(ports_.checks.size(), 1U) << "there is room again";
+  EXPECT_EQ(ports_.checks.size(), 1U) << "finished checks make room for others";
 }
 
-TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsNumber) {
+TEST_F(ServiceTest, AnInvalidLongFrameIsAnsweredWithItsRequestNumber) {
   std::string frame = protocol::encode(long_submission("a", kLongRequest));
   frame.back() = '\x7f';
   frame += '\x7f';
@@ -81,7 +81,7 @@ std::string reply_of(const protocol::QueryReply& query) {
 
 class ServiceQueryTest : public ServiceTest {
  protected:
-  void ask(std::uint64_t request_id, const std::string& identity = "client") {
+  void request_query(std::uint64_t request_id, const std::string& identity = "client") {
     ClientRequest message = client_request(request_id);
     message.mutable_query()->set_sql("SELECT 1");
     send(message, identity);
@@ -103,7 +103,7 @@ class ServiceQueryTest : public ServiceTest {
 };
 
 TEST_F(ServiceQueryTest, AClientGetsStillWorkingEverySecondForItsQuery) {
-  ask(7);
+  request_query(7);
   pass(900);
   EXPECT_TRUE(ports_.replies.empty());
   pass(100);
@@ -125,8 +125,8 @@ TEST_F(ServiceQueryTest, OnlyTheQueriesOfADisconnectedClientAreCancelled) {
   for (const bool leaves : {true, false}) {
     start({});
     ports_ = {};
-    ask(7);
-    ask(8, "another");
+    request_query(7);
+    request_query(8, "another");
     if (leaves) {
       service_->client_left("client");
     } else {
@@ -144,20 +144,20 @@ TEST_F(ServiceQueryTest, OnlyTheQueriesOfADisconnectedClientAreCancelled) {
 }
 
 TEST_F(ServiceQueryTest, TooManyQueriesAreRefusedAndARepeatedOneRunsOnce) {
-  ask(7);
-  ask(7);
+  request_query(7);
+  request_query(7);
   EXPECT_EQ(ports_.queries.size(), 1U);
-  ask(7, "another");
+  request_query(7, "another");
   EXPECT_EQ(ports_.queries.size(), 2U);
   EXPECT_TRUE(ports_.replies.empty());
-  ask(8);
+  request_query(8);
   EXPECT_THAT(last_error(), HasSubstr("too many queries"));
   EXPECT_EQ(last_reply().request_id(), 8U);
 }
 
 TEST_F(ServiceQueryTest, ChunksAreForwardedAndTheirConfirmationsPassedToTheReaders) {
   using Taken = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
-  ask(7);
+  request_query(7);
   give(0);
   give(0);
   EXPECT_EQ(ports_.replies.size(), 2U);
@@ -177,7 +177,7 @@ TEST_F(ServiceQueryTest, ChunksAreForwardedAndTheirConfirmationsPassedToTheReade
 }
 
 TEST_F(ServiceQueryTest, ConfirmingUnsentChunksEndsTheAnswer) {
-  ask(7);
+  request_query(7);
   give(0);
   want_more(7, UINT64_MAX);
   EXPECT_THAT(last_error(), testing::HasSubstr("than were sent"));
@@ -186,7 +186,7 @@ TEST_F(ServiceQueryTest, ConfirmingUnsentChunksEndsTheAnswer) {
 }
 
 TEST_F(ServiceQueryTest, AnswersOfOtherClientsCanBeNeitherConfirmedNorEnded) {
-  ask(7);
+  request_query(7);
   give(0);
   want_more(7, 1, "another");
   EXPECT_THAT(last_error(), testing::HasSubstr("no query"));
@@ -196,7 +196,7 @@ TEST_F(ServiceQueryTest, AnswersOfOtherClientsCanBeNeitherConfirmedNorEnded) {
 }
 
 TEST_F(ServiceQueryTest, EndQueryCancelsTheAnswerWithoutAReply) {
-  ask(7);
+  request_query(7);
   give(0);
   end(7);
   EXPECT_EQ(ports_.cancelled_queries, std::vector{ports_.queries[0].ticket});
@@ -207,7 +207,7 @@ TEST_F(ServiceQueryTest, EndQueryCancelsTheAnswerWithoutAReply) {
 }
 
 TEST_F(ServiceQueryTest, StillWorkingIsNotSentWhileTheClientIsSlow) {
-  ask(7);
+  request_query(7);
   for (std::uint64_t i = 0; i < kChunksAhead; ++i) {
     give(0);
   }
@@ -236,7 +236,8 @@ class ServiceTraceTest : public ServiceTest {
     message.mutable_trace()->set_every(1);
     return message;
   }
-  void ask(std::uint64_t id, std::uint64_t point, const std::string& identity = "client") {
+  void request_trace(std::uint64_t id, std::uint64_t point,
+                     const std::string& identity = "client") {
     send(trace_request(id, point), identity);
   }
 
@@ -274,15 +275,15 @@ class ServiceTraceTest : public ServiceTest {
     trace.set_declined(true);
     return trace;
   }
-  void worker_sends(const protocol::Trace& trace, const std::string& identity = "worker") {
+  void worker_sends_trace(const protocol::Trace& trace, const std::string& identity = "worker") {
     WorkerMessage message;
     *message.mutable_trace() = trace;
-    worker_says(message, identity);
+    worker_sends(message, identity);
   }
   void goodbye(const std::string& identity) {
     WorkerMessage message;
     message.mutable_goodbye();
-    worker_says(message, identity);
+    worker_sends(message, identity);
   }
   void pass(std::int64_t duration_ms) {
     for (; duration_ms > 0; duration_ms -= 100) {
@@ -305,7 +306,7 @@ TEST_F(ServiceTraceTest, AWorkerSolvesATraceBesideItsBatchesAndTheClientGetsIt) 
   EXPECT_DOUBLE_EQ(order.mu(), 3.0 / 99.0);
   EXPECT_TRUE(order.fall());
   EXPECT_EQ(order.every(), 5U);
-  worker_sends(trace_of(order, "\4\2\3"));
+  worker_sends_trace(trace_of(order, "\4\2\3"));
   ASSERT_EQ(ports_.replies.size(), 1U);
   EXPECT_EQ(last_reply().request_id(), 7U);
   const auto reply = last_reply().trace();
@@ -331,7 +332,7 @@ TEST_F(ServiceTraceTest, UnknownStudiesAndPointsAreNamed) {
   send(trace_request(7, 0, std::string(100'000, 'x')), "client");
   EXPECT_LT(last_error().size(), 1000U);
   for (const std::uint64_t point : {std::uint64_t{100}, UINT64_MAX}) {
-    ask(7, point);
+    request_trace(7, point);
     EXPECT_THAT(last_error(), HasSubstr("its points are 0 to 99"));
   }
   EXPECT_TRUE(orders().empty());
@@ -340,26 +341,26 @@ TEST_F(ServiceTraceTest, UnknownStudiesAndPointsAreNamed) {
 TEST_F(ServiceTraceTest, AFailedPointIsNotSolvedAgainBecauseItMayKillAWorker) {
   hello_and_credit();
   answer_batch(0);
-  ask(7, 0);
+  request_trace(7, 0);
   EXPECT_THAT(last_error(), HasSubstr("point 0 of the study \"a\" failed"));
   EXPECT_TRUE(orders().empty());
 }
 
 TEST_F(ServiceTraceTest,
-       APointWithoutAnAnswerIsSolvedEachTimeItIsRequestedAndALongTraceSaysWhatWouldFit) {
+       AnUnsolvedPointIsSolvedAtEachRequestAndATooLongTraceNamesTheIntervalThatFits) {
   hello();
-  ask(7, 3);
+  request_trace(7, 3);
   auto trace = trace_of(orders()[0], "\2");
   *trace.mutable_result() = protocol::failed_point(0, "it slides for ever");
-  worker_sends(trace);
+  worker_sends_trace(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
   // If a trace is too long, the reply contains a value of `every` with which it would fit.
-  ask(9, 3);
+  request_trace(9, 3);
   trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
   trace.set_every(12);
-  worker_sends(trace);
+  worker_sends_trace(trace);
   EXPECT_EQ(last_reply().trace().trace().instants(), 1'000'000U);
   EXPECT_EQ(last_reply().trace().trace().every(), 12U);
   auto with_shape = trace_request(8, 3);
@@ -368,24 +369,24 @@ TEST_F(ServiceTraceTest,
   EXPECT_TRUE(orders().at(2).shape());
 }
 
-TEST_F(ServiceTraceTest, WithoutAWorkerItIsRefusedAtOnce) {
-  ask(7, 3);
+TEST_F(ServiceTraceTest, WithoutAWorkerATraceIsRefusedAtOnce) {
+  request_trace(7, 3);
   EXPECT_THAT(last_error(), HasSubstr("no worker is connected"));
 }
 
 TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
   for (const bool is_lost : {true, false}) {
     hello("one");
-    ask(7, 3);
+    request_trace(7, 3);
     hello("two");
     const auto first = orders().size() - 1;
-    is_lost ? goodbye("one") : worker_sends(declined(orders()[first]), "one");
+    is_lost ? goodbye("one") : worker_sends_trace(declined(orders()[first]), "one");
     ASSERT_EQ(orders().size(), first + 2);
     EXPECT_TRUE(ports_.replies.empty());
     if (is_lost) {
       hello("three");
     }
-    is_lost ? goodbye("two") : worker_sends(declined(orders()[first + 1]), "two");
+    is_lost ? goodbye("two") : worker_sends_trace(declined(orders()[first + 1]), "two");
     EXPECT_THAT(last_error(), HasSubstr(is_lost ? "two workers were lost" : "no connected worker"));
     EXPECT_EQ(orders().size(), first + 2);
     goodbye("three");
@@ -393,18 +394,18 @@ TEST_F(ServiceTraceTest, AWorkerThatIsLostOrDeclinesIsReplacedOnce) {
   }
 }
 
-TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
+TEST_F(ServiceTraceTest, ATraceIsCancelledWhenItsClientDisconnectsOrEndsItsRequest) {
   hello();
-  ask(7, 3);
-  ask(7, 3);  // repeated
+  request_trace(7, 3);
+  request_trace(7, 3);  // repeated
   end(8);
   end(7, "another");
   EXPECT_EQ(cancels(), 0);
   end(7);
   EXPECT_EQ(cancels(), 1);
-  ask(8, 4);
-  EXPECT_EQ(orders().size(), 1U) << "the worker has not said that it is free";
-  worker_sends(declined(orders()[0]));
+  request_trace(8, 4);
+  EXPECT_EQ(orders().size(), 1U) << "the worker has not yet declined its cancelled trace";
+  worker_sends_trace(declined(orders()[0]));
   EXPECT_EQ(orders().size(), 2U);
   service_->client_left("client");
   EXPECT_EQ(cancels(), 2);
@@ -413,15 +414,15 @@ TEST_F(ServiceTraceTest, IsCancelledWhenItsClientHasGoneOrEndsItsRequest) {
 
 TEST_F(ServiceTraceTest, AClientGetsStillWorkingEverySecondForItsTrace) {
   hello();
-  ask(7, 3);
-  ask(7, 4, "another");
+  request_trace(7, 3);
+  request_trace(7, 4, "another");
   pass(1000);
   ASSERT_EQ(ports_.replies.size(), 2U);
   EXPECT_TRUE(ports_.replies[0].still_working().runs());
   EXPECT_FALSE(ports_.replies[1].still_working().runs());
   ports_.unreachable = "client";
   pass(1000);
-  EXPECT_EQ(cancels(), 1) << "no word of it could be delivered";
+  EXPECT_EQ(cancels(), 1) << "the trace of an unreachable client is cancelled";
 }
 
 TEST_F(ServiceTraceTest, ATraceHasATimeLimit) {
@@ -439,7 +440,7 @@ TEST_F(ServiceTraceTest, RunningAndWaitingTracesAreLimited) {
     hello(worker);
   }
   for (std::uint64_t i = 0; i < 100; ++i) {
-    ask(i, i);
+    request_trace(i, i);
   }
   EXPECT_EQ(ports_.replies.size(), 100 - limits::kWaitingTraces);
   EXPECT_THAT(last_error(), HasSubstr("too many traces"));
@@ -454,29 +455,29 @@ TEST_F(ServiceTraceTest, ChecksOfPointsAreLimitedEvenIfTheirClientsAreGone) {
   study.state = StudyState::kPaused;
   start({}, {study});
   for (std::size_t i = 0; i < limits::kWaitingTraces; ++i) {
-    ask(1, 3);
+    request_trace(1, 3);
     service_->client_left("client");
   }
   EXPECT_TRUE(ports_.replies.empty());
-  ask(1, 3, "another");
+  request_trace(1, 3, "another");
   EXPECT_THAT(last_error(), HasSubstr("too many traces"));
   ports_.replies.clear();
   run_checks();
-  EXPECT_TRUE(ports_.replies.empty()) << "nobody waits";
-  ask(1, 3, "another");
+  EXPECT_TRUE(ports_.replies.empty()) << "no client waits for a reply";
+  request_trace(1, 3, "another");
   run_checks();
   EXPECT_THAT(last_error(), HasSubstr("damaged"));
 }
 
-TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
+TEST_F(ServiceTraceTest, AnInvalidTraceFailsTheRequestAndNothingElse) {
   hello();
-  std::uint64_t asked = 0;
+  std::uint64_t requested = 0;
   const auto with = [&](const std::function<void(protocol::Trace&)>& change) {
-    ++asked;
-    ask(asked, asked);
+    ++requested;
+    request_trace(requested, requested);
     protocol::Trace trace = trace_of(orders().back(), "\2\3");
     change(trace);
-    worker_sends(trace);
+    worker_sends_trace(trace);
     return last_error();
   };
   EXPECT_THAT(with([](auto& trace) { trace.add_values(1.0); }), HasSubstr("other columns"));
@@ -493,9 +494,9 @@ TEST_F(ServiceTraceTest, AFaultyTraceFailsTheRequestAndNothingElse) {
                 trace.clear_states();
               }),
               HasSubstr("no rows"));
-  worker_sends(trace_of({}, ""));  // the service ignores a trace that it did not order
-  ask(99, 60);
-  worker_sends(trace_of(orders().back(), "\2"));
+  worker_sends_trace(trace_of({}, ""));  // ignored, because it was not ordered
+  request_trace(99, 60);
+  worker_sends_trace(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());
 }
 
@@ -518,7 +519,7 @@ TEST_F(ServiceTraceTest, AStoppingServerNotifiesWorkersAndRefusesRequests) {
   hello();
   for (const bool is_stopped : {false, true}) {
     ports_.replies.clear();
-    ask(7, 3);
+    request_trace(7, 3);
     request(long_submission("long", kLongRequest));
     ClientRequest query = client_request(8);
     query.mutable_query()->set_sql("SELECT 1");
@@ -541,7 +542,7 @@ TEST_F(ServiceTraceTest, AStoppingServerNotifiesWorkersAndRefusesRequests) {
   }
   const auto sent = ports_.worker_messages.size();
   credit(1);
-  EXPECT_EQ(ports_.worker_messages.size(), sent) << "no batch is sent";
+  EXPECT_EQ(ports_.worker_messages.size(), sent) << "a batch was sent";
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ class ServiceReuseTest : public ServiceTest {
     return message;
   }
   /// Returns the same submission as `reusing`, with ten more points.
-  ClientRequest longer(const std::string& name, std::uint64_t points = 10) {
+  ClientRequest grown_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
     return message;
@@ -130,15 +130,15 @@ TEST_F(ServiceReuseTest, ALookupIsCutShortAfterAMillionProbesOrALongTimeWithoutA
   for (const bool is_long : {false, true}) {
     start({});
     submit_study();
-    const auto vain_part = [&](std::uint64_t next) {
+    const auto part_without_result = [&](std::uint64_t next) {
       now_.steady_ms += is_long ? StudyChanges::kLongestInVain_ms / 2 : 0;
       write_part({{}, {}, is_long ? 1 : StudyChanges::kMaxProbesInVain / 2, next});
     };
-    vain_part(1);
+    part_without_result(1);
     write_part(copies_of_a(IntervalSet(0, 1), 2));  // restarts both limits
-    vain_part(3);
+    part_without_result(3);
     EXPECT_THAT(parts(), ElementsAre(3));
-    vain_part(4);
+    part_without_result(4);
     EXPECT_EQ(ended(), kStudy);
     write_all();
     EXPECT_TRUE(last_reply().submit().reused().cut_short());
@@ -160,7 +160,7 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
   write_all();
   write_part({});
   write_all();
-  request(longer("b", 7));
+  request(grown_request("b", 7));
   write_all();
   EXPECT_THAT(parts(), ElementsAre(0));
   write_part({});
@@ -170,7 +170,7 @@ TEST_F(ServiceReuseTest, AStudyThatGrowsIsLookedUpAgain) {
 
 TEST_F(ServiceReuseTest, AStudyDoesNotGrowDuringItsLookup) {
   submit_study();
-  request(longer("b"));
+  request(grown_request("b"));
   EXPECT_THAT(last_error(), HasSubstr("cannot grow while results"));
 }
 
@@ -240,16 +240,16 @@ TEST_F(FilteredStudyTest, PointsAreValidatedOnTheCheckThread) {
   write_all();
   EXPECT_EQ(last_reply().submit().points(), 11U);
   EXPECT_EQ(status_of("filtered").points(), 11U);
-  EXPECT_EQ(status_of("filtered").left_out(), 0U) << "no worker has named any";
+  EXPECT_EQ(status_of("filtered").left_out(), 0U) << "no worker has reported left-out points yet";
   request(filtered_request("mu >"));
-  EXPECT_THAT(ports_.checks, IsEmpty()) << "refused at once";
+  EXPECT_THAT(ports_.checks, IsEmpty()) << "an invalid filter is refused without a check";
   EXPECT_THAT(last_error(), HasSubstr("where"));
 }
 
 TEST_F(FilteredStudyTest, TracesOfAFilteredStudyUseThePointNumbers) {
   submit_filtered();
   hello();
-  const auto ask = [&](std::uint64_t point) {
+  const auto trace_reply = [&](std::uint64_t point) {
     ports_.replies.clear();
     ClientRequest message = client_request(7);
     message.mutable_trace()->set_study("filtered");
@@ -258,9 +258,10 @@ TEST_F(FilteredStudyTest, TracesOfAFilteredStudyUseThePointNumbers) {
     request(message);
     return last_reply();
   };
-  EXPECT_NEAR(ask(9).trace().mu(), 0.9, 1e-12);
-  EXPECT_THAT(ask(3).error().message(), HasSubstr("point 3 is left out by the study's filter"));
-  EXPECT_THAT(ask(11).error().message(), HasSubstr("its points are 0 to 10"));
+  EXPECT_NEAR(trace_reply(9).trace().mu(), 0.9, 1e-12);
+  EXPECT_THAT(trace_reply(3).error().message(),
+              HasSubstr("point 3 is left out by the study's filter"));
+  EXPECT_THAT(trace_reply(11).error().message(), HasSubstr("its points are 0 to 10"));
 }
 
 TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
@@ -293,7 +294,7 @@ TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
     results.set_lease_id(last_message().batch().lease_id());
     results.set_batch_done(true);
     results.mutable_left_out()->Assign(numbers.begin(), numbers.end());
-    worker_says(message);
+    worker_sends(message);
     write_all();
     EXPECT_EQ(service_->scheduler().workers(), 0U);
     EXPECT_EQ(status_of("filtered").left_out(), 0U);

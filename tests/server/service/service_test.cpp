@@ -41,7 +41,8 @@ TEST_F(ServiceTest, ClientsGetAnErrorWhenTheDatabaseStoresNothingForSeconds) {
   now_.steady_ms += 4999;
   service_->tick(now_);
   request(submit_request("b"));
-  EXPECT_EQ(ports_.replies.size(), replies) << "it may be stored in a moment";
+  EXPECT_EQ(ports_.replies.size(), replies)
+      << "the server waits some seconds for the database before it refuses";
   now_.steady_ms += 1;
   service_->tick(now_);
   request(submit_request("b"));
@@ -71,10 +72,10 @@ TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
   EXPECT_EQ(last_reply().submit().points(), 20U);
 }
 
-TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
-  const auto error_of = [&](const auto& spoil) {
+TEST_F(ServiceTest, InvalidStudiesAreRefusedWithTheReason) {
+  const auto error_of = [&](const auto& make_invalid) {
     ClientRequest message = submit_request("a");
-    spoil(*message.mutable_submit());
+    make_invalid(*message.mutable_submit());
     request(message);
     return last_error();
   };
@@ -94,14 +95,14 @@ TEST_F(ServiceTest, BadStudiesAreRefusedWithTheReason) {
 
 TEST_F(ServiceTest, AWorkerIsWelcomedByNumberAndItsHeartbeatsAreAnswered) {
   credit(1);
-  EXPECT_TRUE(last_message().has_hello_again()) << "a stranger";
+  EXPECT_TRUE(last_message().has_hello_again()) << "an unknown worker";
   hello();
   EXPECT_EQ(last_message().welcome().worker_id(), 1U);
   EXPECT_EQ(last_message().welcome().database_id(), "db");
   EXPECT_EQ(last_message().welcome().lost_after_ms(), 2800U);
   WorkerMessage message;
   message.mutable_heartbeat();
-  worker_says(message);
+  worker_sends(message);
   EXPECT_TRUE(last_message().has_heartbeat_reply());
 }
 
@@ -119,8 +120,8 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
   hello_and_credit();
   WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
   message.mutable_results()->set_batch_done(true);
-  worker_says(message);
-  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
+  worker_sends(message);
+  ASSERT_EQ(ports_.jobs.size(), 2U) << "expected one row of the worker and one of the results";
   EXPECT_FALSE(last_message().has_results_stored());
   write_all();
   EXPECT_EQ(last_message().results_stored().sequence(), sequence_);
@@ -137,10 +138,10 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
   results.at(0).set_h_m(std::nextafter(results.at(0).h_m(), 2.0));
   results.at(1).set_h_m(1.001 * results.at(1).h_m());
   results.at(2).set_reals(4, std::numeric_limits<double>::quiet_NaN());
-  worker_says(message);
-  ASSERT_EQ(ports_.jobs.size(), 2U) << "the worker's row and the results";
+  worker_sends(message);
+  ASSERT_EQ(ports_.jobs.size(), 2U) << "expected one row of the worker and one of the results";
   const auto& change = std::get<AddResults>(ports_.jobs[1].change);
-  EXPECT_EQ(change.results.at(0).error(), "") << "another machine may round otherwise";
+  EXPECT_EQ(change.results.at(0).error(), "") << "inputs may differ by rounding";
   EXPECT_THAT(change.results.at(1).error(), HasSubstr("H = 1.00"));
   EXPECT_THAT(change.results.at(2).error(), HasSubstr("duration_s"));
   write_all();
@@ -154,7 +155,7 @@ TEST_F(ServiceTest, AWorkerWithWrongInputsIsNotProven) {
   protocol::PointResult& result = *message.mutable_results()->mutable_results(0);
   for (const bool is_right : {false, true}) {
     result.set_h_m(solved(0).h_m() * (is_right ? 1.0 : 1.001));
-    worker_says(message);
+    worker_sends(message);
     EXPECT_EQ(service_->scheduler().worker(1, now_.steady_ms).is_proven, is_right);
   }
 }
@@ -175,7 +176,7 @@ TEST_F(ServiceTest, StatusHasTheRateOfTheLastSeconds) {
   hello();
   std::vector<std::uint64_t> points(100);
   std::iota(points.begin(), points.end(), std::uint64_t{0});
-  worker_says(results_of(points));
+  worker_sends(results_of(points));
   write_all();
   now_.steady_ms += 500;
   const auto status = status_of("a");
@@ -196,12 +197,12 @@ WorkerMessage hello_of(std::uint32_t protocol_version, const std::string& solver
 }
 
 TEST_F(ServiceTest, AWorkerWithAnotherSolverOrOtherOutputsIsRefusedWithTheReason) {
-  worker_says(hello_of(protocol::kProtocolVersion, "0.9"));
+  worker_sends(hello_of(protocol::kProtocolVersion, "0.9"));
   EXPECT_THAT(last_message().refused().reason(), AllOf(HasSubstr("0.9"), HasSubstr("1.0")));
   for (const std::string& outputs : {std::string(), protocol::sent_outputs() + " new_N"}) {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
     message.mutable_hello()->set_outputs(outputs);
-    worker_says(message);
+    worker_sends(message);
     EXPECT_THAT(last_message().refused().reason(), HasSubstr("other outputs"));
   }
   EXPECT_EQ(service_->scheduler().workers(), 0U);
@@ -235,7 +236,7 @@ TEST_F(ServiceTest, AnotherPriorityIsAcknowledgedOnceItIsDurable) {
   again.mutable_submit()->set_priority(7);
   const std::size_t replies = ports_.replies.size();
   request(again);
-  EXPECT_EQ(ports_.replies.size(), replies) << "not before it is written";
+  EXPECT_EQ(ports_.replies.size(), replies) << "the reply was sent before the priority was stored";
   write_all();
   EXPECT_TRUE(last_reply().has_submit());
   EXPECT_EQ(status_of("a").priority(), 7);
@@ -249,7 +250,7 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
   const std::string own = fmt::format("version {}", protocol::kProtocolVersion);
   for (const std::uint32_t version :
        {0U, protocol::kProtocolVersion - 1, protocol::kProtocolVersion + 1, 77U}) {
-    worker_says(hello_of(version, "1.0"));
+    worker_sends(hello_of(version, "1.0"));
     EXPECT_THAT(last_message().refused().reason(),
                 HasSubstr(fmt::format("{}, but the worker has version {}", own, version)));
     ClientRequest message = submit_request("a");
@@ -266,11 +267,11 @@ TEST_F(ServiceTest, PeersOfAnyOtherProtocolVersionAreRefusedWithBothVersions) {
 TEST_F(ServiceTest, TextFromAWorkerCannotForgeLogLines) {
   WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
   message.mutable_hello()->set_name("a\n\x1b[31mb");
-  worker_says(message);
+  worker_sends(message);
   EXPECT_THAT(ports_.lines.back(), HasSubstr("(a??[31mb, 1 threads) joins"));
 }
 
-TEST_F(ServiceTest, ALateHeartbeatRevealsALostConnection) {
+TEST_F(ServiceTest, AWorkerWithALateHeartbeatAndALostConnectionIsDropped) {
   submit("a");
   hello_and_credit();
   ports_.unreachable = "worker";
@@ -301,11 +302,11 @@ TEST_F(ServiceTest, TooLargeMessagesOfWorkersAreNotParsed) {
   for (std::size_t i = 0; i <= protocol::kMaxResultsAMessage; ++i) {
     results.mutable_results()->add_results();
   }
-  worker_says(heartbeat);
-  EXPECT_EQ(service_->bad_frames(), 1U) << "a stranger's";
+  worker_sends(heartbeat);
+  EXPECT_EQ(service_->bad_frames(), 1U) << "a heartbeat of an unknown worker";
   for (const WorkerMessage& message : {heartbeat, results}) {
     hello();
-    worker_says(message);
+    worker_sends(message);
     EXPECT_TRUE(last_message().has_hello_again());
     EXPECT_EQ(service_->scheduler().workers(), 0U);
   }
@@ -313,16 +314,16 @@ TEST_F(ServiceTest, TooLargeMessagesOfWorkersAreNotParsed) {
   EXPECT_TRUE(ports_.jobs.empty());
 }
 
-TEST_F(ServiceTest, AWorkerGetsARowWithItsFirstResult) {
+TEST_F(ServiceTest, AWorkerIsStoredWithItsFirstResult) {
   submit("a", 4);
   for (int i = 0; i < 1000; ++i) {
     hello("worker " + std::to_string(i));
   }
   EXPECT_TRUE(ports_.jobs.empty());
   hello_and_credit();
-  worker_says(results_of({0}));
-  worker_says(results_of({0}));
-  ASSERT_EQ(ports_.jobs.size(), 3U) << "one row of the worker, and two messages";
+  worker_sends(results_of({0}));
+  worker_sends(results_of({0}));
+  ASSERT_EQ(ports_.jobs.size(), 3U) << "expected one row of the worker and two messages of results";
   EXPECT_EQ(std::get<AddWorker>(ports_.jobs[0].change).worker_id, 1001U);
   EXPECT_EQ(std::get<AddResults>(ports_.jobs[1].change).worker_id, 1001U);
 }
@@ -332,7 +333,7 @@ TEST_F(ServiceTest, WorkersThatReconnectAgainAndAgainDoNotFillTheLog) {
   goodbye.mutable_goodbye();
   for (int i = 0; i < 10'000; ++i) {
     hello("worker " + std::to_string(i));
-    worker_says(goodbye, "worker " + std::to_string(i));
+    worker_sends(goodbye, "worker " + std::to_string(i));
   }
   EXPECT_EQ(ports_.lines.size(), 20U);
   ports_.lines.clear();
@@ -375,7 +376,7 @@ class ProcessesTest : public ServiceTest {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
     message.mutable_hello()->set_name(name);
     message.mutable_hello()->set_process_id(process_id);
-    worker_says(message, identity);
+    worker_sends(message, identity);
   }
   /// Makes three new workers join, get batches and vanish.
   void let_newcomers_vanish() {

@@ -29,7 +29,8 @@ class CompletedRangesTest : public StoreFixture {
   }
 };
 
-TEST_F(CompletedRangesTest, RetriedFailuresLeaveTheirRangeAndTheStudyStaysCounted) {
+TEST_F(CompletedRangesTest,
+       RetriedFailuresAreRemovedFromTheirRangeAndTheStudyStaysMarkedAsCounted) {
   const auto study = study_of(9);
   commit({study, worker(1), solved(study, {0, 1, 2, 6, 7, 8}), failed(study, {3, 4, 5})});
   EXPECT_THAT(ranges(), ElementsAre("0+9"));
@@ -48,7 +49,7 @@ TEST_F(CompletedRangesTest, RowsDeletedByHandWhileAServerRunsAreOpenAfterTheNext
   const auto other = study_of(9, 2, "b");
   commit({study, other, worker(1), solved(study, {0, 1, 2, 3}), failed(study, {8}),
           solved(other, {0, 1})});
-  by_hand("DELETE FROM results WHERE study_id = 1 AND point = 1");
+  execute_sql("DELETE FROM results WHERE study_id = 1 AND point = 1");
   commit({ForgetFailures{1, IntervalSet(8, 9), "now"}});
   commit({solved(study, {5})});
   EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("0", "1"));
@@ -114,7 +115,7 @@ TEST_F(CompletedRangesTest, PointsThatAFilterLeavesOutAreExaminedAgainWhenRowsAr
   EXPECT_EQ(store().studies().at(0).completed.size(), 7U);
   EXPECT_EQ(store().studies().at(0).left_out, 4U);
   close();
-  by_hand("DELETE FROM results WHERE point = 5");
+  execute_sql("DELETE FROM results WHERE point = 5");
   EXPECT_EQ(store().studies().at(0).left_out, 0U);
   EXPECT_THAT(ranges(), ElementsAre("4+1", "8+1"));
 }
@@ -125,16 +126,16 @@ TEST_F(CompletedRangesTest, OnlyPointsThatWereOpenAreCountedAsLeftOut) {
   again.left_out.insert(3, 7);
   commit({study, worker(1), solved(study, {3})});
   commit({again});
-  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "points 5 and 6";
+  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "points 5 and 6 are left out";
   commit({again});
-  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "they come again";
+  EXPECT_EQ(store().studies().at(0).left_out, 2U) << "ranges that are reported again count once";
   EXPECT_THAT(ranges(), ElementsAre("3+4"));
 }
 
 TEST_F(CompletedRangesTest, AResultCompletesAPointThatAlreadyHasARow) {
   const auto study = study_of(10);
   commit({study, worker(1), solved(study, {3, 4})});
-  by_hand("DELETE FROM completed_ranges");
+  execute_sql("DELETE FROM completed_ranges");
   commit({solved(study, {4})});
   EXPECT_THAT(ranges(), ElementsAre("4+1"));
 }

@@ -91,7 +91,7 @@ TEST_F(SamePointsTest, ACopyDiffersFromItsSourceOnlyInStudyPointAndOrigin) {
   EXPECT_EQ(copies(2).at(3), "3 of a/3");
   EXPECT_THAT(faults(), IsEmpty());
   commit({RenameStudy{1, "c"}});
-  EXPECT_EQ(copies(2).at(3), "3 of a/3") << "the name when it was copied";
+  EXPECT_EQ(copies(2).at(3), "3 of a/3") << "a copied row keeps the name that its source had then";
 }
 
 TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrToADeletedStudy) {
@@ -102,7 +102,7 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrTo
   IntervalSet expected(0, 10);
   std::uint64_t id = 3;
   for (const auto& [change, lost] : changes) {
-    by_hand(change);
+    execute_sql(change);
     expected.erase(lost.begin, lost.end);
     add(id, "another", points_);
     EXPECT_EQ(reuse_part(id, points_).points, expected) << change;
@@ -111,14 +111,14 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrTo
   }
 }
 
-TEST_F(SamePointsTest, PointsThatAreCompletedWithoutARowGetNone) {
-  by_hand("INSERT INTO completed_ranges VALUES (2, 2, 3)");
+TEST_F(SamePointsTest, PointsCompletedWithoutARowGetNoCopiedRow) {
+  execute_sql("INSERT INTO completed_ranges VALUES (2, 2, 3)");
   IntervalSet others(0, 10);
   others.erase(2, 5);
-  EXPECT_EQ(reused(), others) << "a condition leaves them out";
+  EXPECT_EQ(reused(), others) << "points outside the condition are not reused";
 }
 
-TEST_F(ResultReuseTest, ALookupThatEndedIsNotedInTheStudy) {
+TEST_F(ResultReuseTest, TheEndOfALookupIsStoredWithTheStudy) {
   commit({AddStudy{3, "c", table_of(10), "then", {}, "", true}});
   EXPECT_TRUE(store().studies().at(0).reuses);
   commit({EndReuse{3}});

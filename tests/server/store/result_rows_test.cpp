@@ -36,7 +36,7 @@ class ResultRowsTest : public StoreFixture {
   }
 };
 
-TEST_F(ResultRowsTest, ColumnsAreThoseOfTheTable) {
+TEST_F(ResultRowsTest, WrittenColumnsAreExactlyThoseOfTheTable) {
   store();
   const std::string columns_of =
       "SELECT name FROM pragma_table_info('{}') WHERE name <> 'checksum'";

@@ -97,8 +97,8 @@ class StoreFixture : public testing::Test {
   void close() { store_.reset(); }
 
   /// Runs SQL on a connection of its own, like another program.
-  void by_hand(const std::string& sql) const { by_hand(path_, sql); }
-  static void by_hand(const std::string& path, const std::string& sql) {
+  void execute_sql(const std::string& sql) const { execute_sql(path_, sql); }
+  static void execute_sql(const std::string& path, const std::string& sql) {
     execute(open_database(path, SQLITE_OPEN_READWRITE).get(), sql);
   }
   /// Returns the rows of a query. The values of a row are separated by '|'.

@@ -27,7 +27,7 @@ using testing::SizeIs;
 
 using StoreTest = StoreFixture;
 
-TEST_F(StoreTest, CommittedRowsAreThereAfterReopening) {
+TEST_F(StoreTest, CommittedRowsSurviveReopening) {
   auto study = study_of(10);
   study.submitted_by = "alice";
   commit({study, worker(1), solved(study, {0, 1, 5}), failed(study, {7})});
@@ -69,7 +69,7 @@ TEST_F(StoreTest, AnEmptyDatabaseHasAnIdAndCountsStarts) {
   EXPECT_EQ(store().count_start(), 2U);
 }
 
-TEST_F(StoreTest, TheFirstResultOfAPointStays) {
+TEST_F(StoreTest, ASecondResultOfAPointDoesNotReplaceTheFirst) {
   const auto study = study_of(3);
   commit({study, worker(1), solved(study, {1})});
   auto other = solved_point(1);
@@ -87,7 +87,7 @@ TEST_F(StoreTest, AFailedTransactionKeepsNothing) {
   commit({solved(study, {0})});
   EXPECT_EQ(store().studies().at(0).completed.size(), 1U);
   EXPECT_THAT(rows("SELECT 1 FROM results JOIN models USING (model_id)"), ElementsAre("1"))
-      << "the model was rolled back, too";
+      << "the model was rolled back and is stored again";
 }
 
 TEST_F(StoreTest, TheStateOfAStudyIsKept) {
@@ -141,7 +141,7 @@ TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
               ElementsAre("8|8|[0.4,0.4,0.4]"));
 }
 
-TEST_F(StoreTest, RunsNamesTheStudyItsModelAndTheWorker) {
+TEST_F(StoreTest, TheViewRunsShowsTheStudyItsModelAndTheWorker) {
   const auto study = study_of(3);
   commit({study, worker(1), solved(study, {1})});
   EXPECT_THAT(rows("SELECT study, mu, e, E_Pa, elements_per_link, worker_id, worker_name,"
@@ -180,7 +180,7 @@ TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
   execute_with(open_database(path_, SQLITE_OPEN_READWRITE).get(),
                "UPDATE studies SET recipe = ?, checksum = NULL WHERE study_id = 1",
                Blob{recipe.SerializeAsString()});
-  by_hand("UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 3");
+  execute_sql("UPDATE studies SET name = CAST(x'61ff' AS TEXT) WHERE study_id = 3");
   const auto studies = store().studies();
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].name, "b");
@@ -192,7 +192,7 @@ TEST_F(StoreTest, AStudyThatThisVersionRefusesIsSkippedAndNamed) {
 TEST_F(StoreTest, ARecipeThatCannotBeReadIsAnErrorThatNamesTheStudy) {
   commit({study_of(3)});
   close();
-  by_hand("UPDATE studies SET recipe = x'ff', checksum = NULL");
+  execute_sql("UPDATE studies SET recipe = x'ff', checksum = NULL");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("recipe of study a"), HasSubstr("`oblique check")));
 }
 
@@ -200,10 +200,11 @@ TEST_F(StoreTest, AStudyNumberIsNeverReused) {
   const auto study = study_of(5, 2);
   commit({study, solved(study, {0}), study_of(5, 3, "b")});
   close();
-  by_hand("DELETE FROM studies");
+  execute_sql("DELETE FROM studies");
   EXPECT_EQ(store().last_study_id(), 3U);
-  by_hand("UPDATE results SET study_id = 7");
-  EXPECT_EQ(store().last_study_id(), 7U) << "its rows would become those of the new study";
+  execute_sql("UPDATE results SET study_id = 7");
+  EXPECT_EQ(store().last_study_id(), 7U)
+      << "rows of study 7 would belong to a new study of this number";
 }
 
 TEST_F(StoreTest, AStudyThatWasChangedByHandIsRefusedWithTheRemedy) {
@@ -212,16 +213,16 @@ TEST_F(StoreTest, AStudyThatWasChangedByHandIsRefusedWithTheRemedy) {
   for (const char* change :
        {"study_id = 3", "points = 6", "recipe = x'ff'", "errors = 1", "created_at = ''"}) {
     const std::string where = " WHERE name = 'second'";
-    by_hand("CREATE TABLE before AS SELECT * FROM studies" + where);
-    by_hand(std::string("UPDATE studies SET ") + change + where);
+    execute_sql("CREATE TABLE before AS SELECT * FROM studies" + where);
+    execute_sql(std::string("UPDATE studies SET ") + change + where);
     EXPECT_THAT(refusal(), AllOf(HasSubstr("(\"second\")"), HasSubstr("SET checksum = NULL")))
         << change;
-    by_hand("DELETE FROM studies" + where +
-            "; INSERT INTO studies SELECT * FROM before; DROP TABLE before");
+    execute_sql("DELETE FROM studies" + where +
+                "; INSERT INTO studies SELECT * FROM before; DROP TABLE before");
     EXPECT_EQ(refusal(), "it opened");
   }
-  EXPECT_THROW(by_hand("UPDATE studies SET study_id = 0"), StorageError);
-  EXPECT_THROW(by_hand("UPDATE studies SET study_id = 9223372036854775807"), StorageError);
+  EXPECT_THROW(execute_sql("UPDATE studies SET study_id = 0"), StorageError);
+  EXPECT_THROW(execute_sql("UPDATE studies SET study_id = 9223372036854775807"), StorageError);
 }
 
 // ---- Studies that grow, are renamed or deleted --------------------------------------------------
@@ -255,7 +256,7 @@ class StudyDeletionTest : public StoreFixture {
   }
 };
 
-TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndARightChecksum) {
+TEST_F(StudyDeletionTest, AStudyThatGrowsOrIsRenamedKeepsItsRowsAndAValidChecksum) {
   add_solved(1, table_of(10));
   commit({SetStudyState{1, StudyState::kDone, "then"}});
   commit({GrowStudy{1, grown_table(), 2, "now"}, RenameStudy{1, "another name"}});
@@ -287,7 +288,7 @@ TEST_F(StudyDeletionTest, ADeletedStudyIsGoneAtOnceAndItsRowsAreDeletedInParts) 
   EXPECT_EQ(store().clear_away(10), ClearedAway::kAll);
 }
 
-TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinues) {
+TEST_F(StudyDeletionTest, AfterAKillTheNextProcessContinuesTheDeletion) {
   for (int steps = 0; steps < 8; ++steps) {
     const std::uint64_t id = static_cast<std::uint64_t>(2 * steps + 1);
     add_solved(id, table_of(20));
@@ -335,9 +336,9 @@ TEST_F(StudyDeletionTest, OrphanedModelsAndWorkersAreDeletedAtAStartAfterTheRows
   add_solved(3, table_with_k(2e7, 20));
   commit({DeleteStudy{1}, DeleteStudy{2}});
   reopen();
-  EXPECT_EQ(rows_in("models"), 2) << "rows are left";
+  EXPECT_EQ(rows_in("models"), 2) << "models of remaining rows are kept";
   clear_all(7);
-  EXPECT_EQ(rows_in("models"), 2) << "they may come into use again";
+  EXPECT_EQ(rows_in("models"), 2) << "unused models are deleted only at a start";
   reopen();
   EXPECT_EQ(rows_in("models"), 1);
   EXPECT_EQ(rows_in("workers"), 1);
@@ -345,7 +346,7 @@ TEST_F(StudyDeletionTest, OrphanedModelsAndWorkersAreDeletedAtAStartAfterTheRows
   EXPECT_EQ(number("SELECT has_orphans FROM about"), 0);
   add_solved(4, table_with_k(1e7, 3));
   EXPECT_EQ(rows_in("results JOIN models USING (model_id) WHERE k = 1e7"), 3)
-      << "a model that was deleted comes again";
+      << "a deleted model is stored again";
 }
 
 TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
@@ -386,14 +387,14 @@ class SchemaTest : public StoreFixture {
 };
 
 TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
-  by_hand("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
+  execute_sql("CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
   const auto before = objects();
   ASSERT_EQ(before.size(), 9U);
   for (const std::string change :
        {"DROP VIEW runs", "DROP VIEW peaks", "DROP VIEW phases", "DROP VIEW stick_intervals",
         "DROP VIEW reaction_peaks", "DROP VIEW peaks; CREATE VIEW peaks AS SELECT 7 AS mine",
         "DROP TRIGGER row_deleted", "DROP INDEX failed_points", "DROP INDEX solved_points"}) {
-    by_hand(change);
+    execute_sql(change);
     EXPECT_EQ(refusal(), "it opened");
     EXPECT_EQ(objects(), before) << change;
   }
@@ -401,14 +402,15 @@ TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
 }
 
 TEST_F(SchemaTest, TriggersOfTheFileDoNotRunWithTheChangesOfAServer) {
-  by_hand("CREATE TRIGGER other AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END");
-  EXPECT_THROW(by_hand("UPDATE studies SET priority = 1"), StorageError);
+  execute_sql(
+      "CREATE TRIGGER other AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END");
+  EXPECT_THROW(execute_sql("UPDATE studies SET priority = 1"), StorageError);
   commit({SetPriority{1, 7}});
   EXPECT_THAT(rows("SELECT priority FROM studies"), ElementsAre("7"));
 }
 
 TEST_F(SchemaTest, AFileWithATableNamedLikeAViewIsRefusedUnchanged) {
-  by_hand("DROP VIEW runs; CREATE TABLE runs (mine)");
+  execute_sql("DROP VIEW runs; CREATE TABLE runs (mine)");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
   EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
 }
@@ -453,13 +455,13 @@ TEST_F(StoreFilesTest, ACommitDuringWhichTheFileIsDeletedIsNotAcknowledged) {
 }
 
 TEST_F(StoreFilesTest, NothingIsAcknowledgedAfterTheFileIsDeletedRenamedOrReplaced) {
-  const std::map<std::string, std::function<void()>> blows{
+  const std::map<std::string, std::function<void()>> changes{
       {"the database is deleted", [&] { fs::remove(path_); }},
       {"it is renamed", [&] { fs::rename(path_, folder_.file("elsewhere.db")); }},
       {"its folder is renamed",
        [&] { fs::rename(folder_.file("lab"), folder_.file("laboratory")); }},
       {"another database takes its name", [&] { fs::rename(other_, path_); }}};
-  for (const auto& [what, blow] : blows) {
+  for (const auto& [what, change] : changes) {
     close();
     for (const char* name : {"lab", "laboratory", "other.db", "elsewhere.db"}) {
       fs::remove_all(folder_.file(name));
@@ -468,7 +470,7 @@ TEST_F(StoreFilesTest, NothingIsAcknowledgedAfterTheFileIsDeletedRenamedOrReplac
     make_databases();
     add_result(0);
     EXPECT_NO_THROW(store().check()) << what;
-    blow();
+    change();
     EXPECT_THROW(store().check(), StorageGone) << what;
     EXPECT_THROW(add_result(1), StorageGone) << what;
     EXPECT_THROW(store().merge_log(), StorageGone) << what;
@@ -489,7 +491,7 @@ TEST_F(StoreFilesTest, ARenamedDatabaseGetsAllAcknowledgedChangesWhenItsServerEn
 
 TEST_F(StoreFilesTest, ARunningQueryKeepsTheLogAndAnIdleReaderDoesNot) {
   add_result(0);
-  EXPECT_EQ(rows_of_copy("before.db"), 0) << "it is in the log";
+  EXPECT_EQ(rows_of_copy("before.db"), 0) << "the row is still in the log";
   const DatabaseHandle waits = open_database(path_, SQLITE_OPEN_READONLY);
   EXPECT_THAT(rows(waits.get(), "SELECT count(*) FROM results"), ElementsAre("1"));
   const DatabaseHandle reads = open_database(path_, SQLITE_OPEN_READONLY);

@@ -178,8 +178,8 @@ TEST_F(GroupCommitTest, CommitsToADeletedFileAreNotReportedAsStored) {
   storage_.goes_in_commit = true;
   jobs_ = {kept(1), answered(2)};
   EXPECT_EQ(write(), (Reports{{Kind::kGone, 0}}));
-  EXPECT_THAT(storage_.sizes, ElementsAre(2)) << "both in one transaction";
-  EXPECT_EQ(jobs_.size(), 2U) << "they count as lost";
+  EXPECT_THAT(storage_.sizes, ElementsAre(2)) << "both changes are in one transaction";
+  EXPECT_EQ(jobs_.size(), 2U) << "both changes remain unstored";
   EXPECT_THAT(write(), IsEmpty()) << "reported once, never tried again";
   EXPECT_THAT(storage_.sizes, ElementsAre(2));
 }
@@ -218,7 +218,7 @@ TEST_F(GroupCommitTest, TheLogIsMergedWhenAStudyIsDoneAsSoonAsReadersAllowIt) {
 }
 
 TEST_F(GroupCommitTest, AFailedDeletionStepIsRepeatedWithoutAReport) {
-  EXPECT_FALSE(commits_.has_to_clear()) << "not before it is told";
+  EXPECT_FALSE(commits_.has_to_clear()) << "no deletion has been committed yet";
   commits_.resume_deletions();
   storage_.parts_left = 2;
   std::vector<WriteReport> reports;
@@ -277,7 +277,7 @@ TEST_F(WriterTest, ManyJobsShareATransactionAndStayInOrder) {
   EXPECT_EQ(count(Kind::kStored), kJobs);
 }
 
-TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
+TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedWhenTheWriterStops) {
   storage_.on_change = [this](const Change&) {
     storage_.is_interrupted.wait(false);
     throw StorageError("interrupted");
@@ -286,7 +286,7 @@ TEST_F(WriterTest, AStatementThatNeverEndsIsInterruptedAtTheEnd) {
   EXPECT_EQ(writer_.finish(), 1U) << "it is not durable";
 }
 
-TEST_F(WriterTest, TheEndTriesSeveralTimesToMergeTheLogAndReportsFailure) {
+TEST_F(WriterTest, AStoppingWriterTriesSeveralTimesToMergeTheLogAndReportsFailure) {
   storage_.merged_at = 1'000'000;
   writer_.submit(kept(1));
   EXPECT_EQ(writer_.finish(), 0U);
@@ -302,7 +302,8 @@ TEST_F(WriterTest, RowsOfDeletedStudiesAreDeletedBetweenWritesAndWhenIdle) {
   ASSERT_EQ(wait_for_ticket(2), Kind::kStored);
   for (std::uint64_t ticket = 3; storage_.parts_left > 0; ++ticket) {
     writer_.submit(kept(ticket));
-    EXPECT_EQ(wait_for_ticket(ticket), Kind::kStored) << "written meanwhile";
+    EXPECT_EQ(wait_for_ticket(ticket), Kind::kStored)
+        << "a change must be written between parts of a deletion";
   }
   EXPECT_EQ(writer_.finish(), 0U);
 }

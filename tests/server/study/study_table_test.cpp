@@ -31,7 +31,7 @@ StudyTable stored(const protocol::Recipe& recipe, std::uint64_t points) {
   return StudyTable(recipe.SerializeAsString(), points);
 }
 
-TEST(StudyTable, GrowsByBlocksOnlyWhetherOrNotTheTablesAreMade) {
+TEST(StudyTable, OnlyAppendedBlocksAreAGrowthWhetherOrNotTablesAreMade) {
   protocol::Recipe before = recipe_of_mu(listed("mu", {0.1, 0.2}));
   protocol::Recipe longer = before;
   *longer.add_blocks() = recipe_of_mu(listed("mu", {0.3})).blocks(0);
@@ -82,7 +82,7 @@ protocol::Recipe recipe_of_sample(protocol::SampleKind kind, std::uint64_t count
       {protocol::uniform("H", 0.3, 1.1), listed("mu", {0.4}), listed("e", {1.0})}, kind, count)});
 }
 
-TEST(RecipeGrowth, FewerBlocksAreShorterAndTheirNumbersAreNamed) {
+TEST(RecipeGrowth, ARecipeWithFewerBlocksIsShorterAndBothNumbersAreNamed) {
   const Growth growth = growth_of(blocks_of({kFiveMus, kTwoMus}), blocks_of({kFiveMus}));
   EXPECT_EQ(growth.kind, Growth::Kind::kShorter);
   EXPECT_EQ(growth.difference, "stored 2 blocks, given 1");
@@ -125,7 +125,7 @@ TEST(RecipeGrowth, ModelsWithOtherSingleLengthsDiffer) {
   EXPECT_EQ(growth_of(blocks_of({kFiveMus}), given).difference, "model, lengths: they differ");
 }
 
-TEST(RecipeGrowth, ALargerSampleIsLongerUnlessItIsALatinHypercube) {
+TEST(RecipeGrowth, ALargerSampleIsAGrowthUnlessItIsALatinHypercube) {
   for (const auto kind : {protocol::SAMPLE_RANDOM, protocol::SAMPLE_SOBOL}) {
     EXPECT_EQ(growth_of(recipe_of_sample(kind, 10), recipe_of_sample(kind, 20)).kind,
               Growth::Kind::kLonger);

@@ -119,18 +119,18 @@ std::vector<std::unique_ptr<RawHttp>> silent_peers(const EchoServer& server, int
   return peers;
 }
 
-TEST(HttpServer, AnswersBothVersionsAndEndsTheConnection) {
+TEST(HttpServer, AnswersHttp10AndHttp11AndEndsTheConnection) {
   const EchoServer server;
-  const std::string answer = RawHttp(server.url()).ask("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
+  const std::string answer = RawHttp(server.url()).exchange("GET /a?x=1&y=%01 HTTP/1.0\r\n\r\n");
   EXPECT_EQ(status_of_answer(answer), 200);
   EXPECT_EQ(body_of(answer), "/a\n");
-  EXPECT_EQ(body_of(RawHttp(server.url()).ask("GET /b" + kEnd + "GET /c" + kEnd)), "/b\n");
-  const std::string head = RawHttp(server.url()).ask("HEAD /abc" + kEnd);
+  EXPECT_EQ(body_of(RawHttp(server.url()).exchange("GET /b" + kEnd + "GET /c" + kEnd)), "/b\n");
+  const std::string head = RawHttp(server.url()).exchange("HEAD /abc" + kEnd);
   EXPECT_THAT(head, HasSubstr("Content-Length: 5\r\n"));
   EXPECT_EQ(body_of(head), "");
 }
 
-TEST(HttpServer, KeepsBrowsersFromUsingAnswersForAnythingElse) {
+TEST(HttpServer, SendsHeadersThatKeepBrowsersFromMisusingAnswers) {
   const EchoServer server;
   for (const std::string path : {"/", "/wrong", "/quiet"}) {
     RawHttp peer(server.url());
@@ -149,17 +149,17 @@ TEST(HttpServer, KeepsBrowsersFromUsingAnswersForAnythingElse) {
   }
 }
 
-TEST(HttpServer, RefusesWithASentence) {
+TEST(HttpServer, ARefusalContainsASentence) {
   const EchoServer server;
   const std::string rebound =
-      RawHttp(server.url()).ask("GET / HTTP/1.1\r\nHost: evil.example:7602\r\n\r\n");
+      RawHttp(server.url()).exchange("GET / HTTP/1.1\r\nHost: evil.example:7602\r\n\r\n");
   EXPECT_EQ(status_of_answer(rebound), 403);
   EXPECT_THAT(body_of(rebound), HasSubstr("evil.example"));
   EXPECT_EQ(status_of_answer(get(server.url(), "/?a=b%00c")), 400);
-  EXPECT_EQ(status_of_answer(RawHttp(server.url()).ask("GET / HTTP/1.1\r\n\r\n")), 400);
+  EXPECT_EQ(status_of_answer(RawHttp(server.url()).exchange("GET / HTTP/1.1\r\n\r\n")), 400);
   const std::string post =
       RawHttp(server.url())
-          .ask(
+          .exchange(
               "POST / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\n"
               "Content-Length: 3\r\n\r\nabc");
   EXPECT_EQ(status_of_answer(post), 405);
@@ -207,7 +207,7 @@ TEST(HttpServer, AnAddressAtItsConnectionLimitDoesNotAffectOthers) {
   limits.connections_of_one_address = 4;
   const EchoServer server(limits);
   const auto silent = silent_peers(server, 4, "127.0.0.2");
-  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").ask("GET /a" + kEnd), "");
+  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").exchange("GET /a" + kEnd), "");
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
 }
 
@@ -234,7 +234,7 @@ TEST(HttpServer, AnIdleConnectionEnds) {
   silent.read_to_the_end();
   halting.read_to_the_end();
   server.wake_until_in_progress(1);
-  EXPECT_FALSE(quiet->has_news()) << "it takes all that there is";
+  EXPECT_FALSE(quiet->has_news()) << "a stream whose client reads everything was ended";
 }
 
 TEST(HttpServer, ATooSlowTransferEnds) {
@@ -258,7 +258,7 @@ TEST(HttpServer, ATooSlowTransferEnds) {
   get(server.url(), "/a");  // this answer shows that all earlier connections were accepted
   server.let_pass(limits.idle);
   EXPECT_EQ(halting.read_to_the_end(), "");
-  EXPECT_EQ(body_of(uploading.front()->ask(std::string(8192, 'x'))), "/a\n");
+  EXPECT_EQ(body_of(uploading.front()->exchange(std::string(8192, 'x'))), "/a\n");
   uploading.back()->send("x");
   server.let_pass(std::chrono::seconds(2));
   EXPECT_EQ(uploading.back()->read_to_the_end(), "");
@@ -311,7 +311,8 @@ TEST(HttpServer, StreamsAreLimited) {
   const auto staying = begin(server, "/quiet");
   auto leaving = begin(server, "/quiet");
   EXPECT_EQ(status_of_answer(get(server.url(), "/quiet")), 503);
-  EXPECT_EQ(status_of_answer(get(server.url(), "/a")), 200) << "they take no room from others";
+  EXPECT_EQ(status_of_answer(get(server.url(), "/a")), 200)
+      << "streams take no room from other requests";
   leaving.reset();
   server.wake_until_in_progress(1);
   RawHttp next(server.url());
@@ -331,7 +332,7 @@ TEST(HttpServer, StopsWhileRequestsWait) {
   EXPECT_EQ(streaming->read_to_the_end(), "");
 }
 
-TEST(HttpServer, FailsToListenWithoutDescriptors) {
+TEST(HttpServer, ReportsAFailureToListenWithoutFreeDescriptors) {
   rlimit usual{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
   rlimit one = usual;

@@ -23,13 +23,13 @@ class RawHttp : public test::RawTcp {
     while (!all.ends_with(end)) {
       const std::string one = receive(0, 1);
       if (one.empty()) {
-        throw std::runtime_error("the server says no more than: " + all);
+        throw std::runtime_error("the connection ended after: " + all);
       }
       all += one;
     }
     return all;
   }
-  std::string ask(const std::string& bytes) {
+  std::string exchange(const std::string& bytes) {
     send(bytes);
     return read_to_the_end();
   }
@@ -41,7 +41,7 @@ class RawHttp : public test::RawTcp {
 };
 
 inline std::string get(const std::string& url, const std::string& path) {
-  return RawHttp(url).ask("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  return RawHttp(url).exchange("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
 }
 
 /// Returns the status of an HTTP answer, or 0 if the text is no answer.

@@ -221,7 +221,7 @@ TEST(Health, IsGoodWhileTheEventLoopRuns) {
   EXPECT_EQ(health(1000, 8500).body, "the server's event loop has not run for 7.5 s\n");
 }
 
-TEST(Health, ReadinessHasTheReason) {
+TEST(Health, ReadinessGivesTheReasonIfTheServerIsNotReady) {
   constexpr double kPlenty = 1e12;
   EXPECT_EQ(readiness({}, kPlenty).status, 200U);
   EXPECT_EQ(readiness({}, std::numeric_limits<double>::quiet_NaN()).status, 200U);  // unknown
@@ -236,7 +236,7 @@ TEST(Health, ReadinessHasTheReason) {
   EXPECT_EQ(readiness({}, 1e6).body, "the disk of the database has 1 MB left\n");
 }
 
-WebSettings anywhere() {
+WebSettings at_free_port() {
   WebSettings settings;
   settings.address = {"127.0.0.1", "*"};
   settings.limits.idle = test::kHangLimit;
@@ -244,7 +244,7 @@ WebSettings anywhere() {
 }
 
 TEST(Web, ReportsThatTheServerStartsBeforeTheLoopRuns) {
-  const Web web(anywhere());
+  const Web web(at_free_port());
   EXPECT_EQ(body_of(get(web.url(), "/healthz")), "the server runs\n");
   for (const std::string path : {"/metrics", "/readyz"}) {
     const std::string answer = get(web.url(), path);
@@ -265,7 +265,7 @@ class WebTest : public testing::Test {
   }
 
   test::TemporaryFolder folder_;
-  RunningServer server_{folder_.file("a.db"), {}, {}, {}, {}, anywhere()};
+  RunningServer server_{folder_.file("a.db"), {}, {}, {}, {}, at_free_port()};
 };
 
 TEST_F(WebTest, MetricsFollowTheServer) {
@@ -299,10 +299,10 @@ TEST_F(WebTest, ErrorsNameThePaths) {
   }
 }
 
-TEST(Web, AServerRunsWithoutHttpOnlyIfItMay) {
+TEST(Web, AServerRunsWithoutHttpOnlyIfHttpIsOptional) {
   const test::TemporaryFolder folder;
-  const RunningServer first(folder.file("a.db"), {}, {}, {}, {}, anywhere());
-  WebSettings taken = anywhere();
+  const RunningServer first(folder.file("a.db"), {}, {}, {}, {}, at_free_port());
+  WebSettings taken = at_free_port();
   taken.address.port = first.http_url().substr(first.http_url().rfind(':') + 1);
   EXPECT_THAT([&] { RunningServer(folder.file("b.db"), {}, {}, {}, {}, taken); },
               testing::ThrowsMessage<std::runtime_error>(

@@ -116,7 +116,7 @@ class StoreModel {
       }
     }
     if (!matching) {
-      throw Violation("after a restart the store has other contents than were stored");
+      throw Violation("after a restart the store's contents differ from what was stored");
     }
     undone_commits += undone;
     refused_kept += came_back != entries_.end() ? 1U : 0U;
@@ -319,7 +319,8 @@ class SimulatedDisk final : public server::Storage {
     power_was_lost_ = false;
     found.starts = store_->count_start();
     if (found.starts <= std::exchange(starts_, found.starts)) {
-      throw Violation("two servers began with one number: leases of both have the same numbers");
+      throw Violation(
+          "two servers have the same start number, so leases of both have the same numbers");
     }
     model_.synced();
     return found;
@@ -372,8 +373,8 @@ class SimulatedDisk final : public server::Storage {
     }
     Statement references(database.get(), "PRAGMA foreign_key_check");
     if (references.step()) {
-      throw Violation("a row of " + references.text(0) + " names one of " + references.text(2) +
-                      " that is not there");
+      throw Violation("a row of " + references.text(0) + " references a missing row of " +
+                      references.text(2));
     }
     Statement rows(database.get(),
                    "SELECT study_id, point, mu, coalesce(error, ''), duration_s, fn_peak_N, k"
@@ -394,7 +395,7 @@ class SimulatedDisk final : public server::Storage {
       if (row == expected.end() || !agrees(*row->second) || table.point(point).mu != rows.real(2) ||
           table.model(table.point(point).model).k_N_m != rows.real(6)) {
         throw Violation("the row of point " + std::to_string(point) + " of study " +
-                        std::to_string(study_id) + " is not what was stored");
+                        std::to_string(study_id) + " differs from the stored result");
       }
       ++counts[study_id];
     }

@@ -80,7 +80,7 @@ TEST(FailedSyncTest, AServerExitsWithOneAndTheNextServerRecovers) {
     Server server(folder, file, {{"LD_PRELOAD", library}, {"OBLIQUE_FAIL_SYNC", mark}});
     ASSERT_EQ(submit(server, "before").exit_code, 0);
     std::ofstream(mark).put('x');
-    EXPECT_NE(submit(server, "lost").exit_code, 0) << "it was not stored";
+    EXPECT_NE(submit(server, "lost").exit_code, 0) << "the study was not stored";
     EXPECT_EQ(server.process().wait(), 1);
     EXPECT_NE(server.process().err().find("the disk failed to store"), std::string::npos)
         << server.process().err();

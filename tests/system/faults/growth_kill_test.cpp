@@ -18,7 +18,7 @@ namespace oblique::test {
 namespace {
 
 const int kRounds = amount(4, 12);
-constexpr int kPointsABlock = 200;
+constexpr int kPointsPerBlock = 200;
 
 class GrowthKillTest : public ::testing::Test {
  protected:
@@ -71,7 +71,7 @@ TEST_F(GrowthKillTest, AcknowledgedChangesSurviveAKillAtAnyTime) {
     kill_server_within(80);
     EXPECT_EQ(growing->wait(), 0) << "round " << round << ": " << growing->err();
     EXPECT_EQ(number("SELECT points FROM studies WHERE name = 'grows'"),
-              kPointsABlock * (round + 1))
+              kPointsPerBlock * (round + 1))
         << round;
     if (deleting != nullptr) {
       // The client sends the request again to the next server, but the killed server may already
@@ -89,15 +89,15 @@ TEST_F(GrowthKillTest, AcknowledgedChangesSurviveAKillAtAnyTime) {
   EXPECT_EQ(client({"rename", victim, "stays"})->wait(), 0);
   kill_server_within(0);
   EXPECT_EQ(names(), (std::vector<std::string>{"grows", "stays"}));
-  wait_until("all is solved and cleared away", [&] {
+  wait_until("all points are solved and deleted rows are gone", [&] {
     return number("SELECT count(*) FROM studies WHERE state = 'done'") == 2 &&
            number(
                "SELECT count(*) FROM results WHERE study_id IN"
                " (SELECT study_id FROM deletions)") == 0;
   });
-  EXPECT_EQ(number("SELECT count(*) FROM results"), kPointsABlock * (kRounds + 2));
+  EXPECT_EQ(number("SELECT count(*) FROM results"), kPointsPerBlock * (kRounds + 2));
   EXPECT_EQ(number("SELECT count(DISTINCT point) FROM runs WHERE study = 'grows'"),
-            kPointsABlock * kRounds);
+            kPointsPerBlock * kRounds);
   EXPECT_EQ(number("SELECT count(*) FROM completed_ranges WHERE study_id NOT IN"
                    " (SELECT study_id FROM studies)"),
             0);

@@ -31,7 +31,7 @@ class KeysTest : public ::testing::Test {
 
   std::string key(const std::string& name) const { return keys_ + "/" + name + ".key"; }
 
-  Outcome ask(std::vector<std::string> arguments, const std::string& key_file = "") const {
+  Outcome run_client(std::vector<std::string> arguments, const std::string& key_file = "") const {
     arguments.insert(arguments.end(), {"--server", server_->client_url()});
     if (!key_file.empty()) {
       arguments.insert(arguments.end(), {"--keys", key_file});
@@ -47,13 +47,13 @@ class KeysTest : public ::testing::Test {
     return std::make_unique<Worker>(folder_, server_->worker_url(),
                                     std::vector<std::string>{"--threads", "1", "--keys", key_file});
   }
-  static void wait_until_said(const Process& process, const std::string& words) {
+  static void wait_until_printed(const Process& process, const std::string& words) {
     wait_until("the message " + words,
                [&] { return process.err().find(words) != std::string::npos; });
   }
   /// Expects that a client with `key_file` is refused and prints a message with `words`.
-  void expect_turned_away(const std::string& key_file, const std::string& words) const {
-    const Outcome outcome = ask({"status"}, key_file);
+  void expect_client_error(const std::string& key_file, const std::string& words) const {
+    const Outcome outcome = run_client({"status"}, key_file);
     EXPECT_EQ(outcome.exit_code, 1) << key_file;
     EXPECT_THAT(outcome.err, HasSubstr(words));
     EXPECT_THAT(outcome.err, Not(HasSubstr("no answer")));
@@ -71,36 +71,36 @@ TEST_F(KeysTest, WithTheKeysOfTheirRolesAStudyIsSubmittedSolvedAndRead) {
   const auto worker = worker_with(key("worker"));
   auto submit = kFewPoints;
   submit.emplace_back("--watch");
-  EXPECT_EQ(ask(submit, key("client")).exit_code, 0);
-  const Outcome read = ask({"query", "few", "--select", "mu,e,status"}, key("reader"));
+  EXPECT_EQ(run_client(submit, key("client")).exit_code, 0);
+  const Outcome read = run_client({"query", "few", "--select", "mu,e,status"}, key("reader"));
   EXPECT_EQ(read.exit_code, 0) << read.err;
   EXPECT_THAT(read.out, HasSubstr("solved"));
-  EXPECT_THAT(ask({"status", "--format", "json"}, key("reader")).out,
+  EXPECT_THAT(run_client({"status", "--format", "json"}, key("reader")).out,
               HasSubstr(R"("submitted_by":"client","access":"keys")"));
   auto another = kFewPoints;
   another[2] = "another";
-  const Outcome refused = ask(another, key("reader"));
+  const Outcome refused = run_client(another, key("reader"));
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_THAT(refused.err, HasSubstr("has the role reader"));
 }
 
 TEST_F(KeysTest, ARefusedClientReportsTheReasonAndItsKey) {
-  expect_turned_away("", "requires a key, and none was given");
-  expect_turned_away(key("worker"), "it is for workers, and this port is for clients");
+  expect_client_error("", "requires a key, and none was given");
+  expect_client_error(key("worker"), "it is for workers, and this port is for clients");
   const std::string others = folder_.file("others");
   ASSERT_EQ(run_oblique(folder_, {"keygen", others}).exit_code, 0);
-  expect_turned_away(others + "/client.key", "the server's public key in that file is wrong");
+  expect_client_error(others + "/client.key", "the server's public key in that file is wrong");
   ASSERT_EQ(change_keys({"add", "gone", "--role", "client"}).exit_code, 0);
-  wait_until_said(server_->process(), "new: gone");
+  wait_until_printed(server_->process(), "new: gone");
   ASSERT_EQ(change_keys({"revoke", "gone"}).exit_code, 0);
-  wait_until_said(server_->process(), "revoked: gone");
-  expect_turned_away(key("gone"), "not in the server's list");
-  wait_until_said(server_->process(), "has the role worker, but this port is for clients");
-  wait_until_said(server_->process(), "another public key of the server");
-  const Outcome seen = ask({"workers"}, key("reader"));
+  wait_until_printed(server_->process(), "revoked: gone");
+  expect_client_error(key("gone"), "not in the server's list");
+  wait_until_printed(server_->process(), "has the role worker, but this port is for clients");
+  wait_until_printed(server_->process(), "another public key of the server");
+  const Outcome seen = run_client({"workers"}, key("reader"));
   EXPECT_THAT(seen.err, AllOf(HasSubstr("refused since the server started: "),
                               HasSubstr("key of another role (1)")));
-  EXPECT_EQ(ask({"status"}, key("server")).exit_code, 2)
+  EXPECT_EQ(run_client({"status"}, key("server")).exit_code, 2)
       << "a client must not use the server's key";
 }
 
@@ -111,10 +111,10 @@ TEST_F(KeysTest, AValidKeyAtTheWrongPortIsRefusedWithAHint) {
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("or this is not its port for clients (by default 7600)"),
                                  HasSubstr(key("client"))));
   const Worker worker(folder_, server_->client_url(), {"--keys", key("worker")});
-  wait_until_said(worker, "or this is not its port for workers (by default 7601)");
+  wait_until_printed(worker, "or this is not its port for workers (by default 7601)");
 }
 
-TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwn) {
+TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwnKey) {
   Process server(folder_, server_program(),
                  {"--db", folder_.file("a.db"), "--worker-port", "0", "--client-port", "0"},
                  Environment{{"OBLIQUE_KEYS", key("client")}});
@@ -126,7 +126,7 @@ TEST_F(KeysTest, AServerWithAClientsKeyNamesTheVariableForItsOwn) {
 
 TEST_F(KeysTest, AKeyFileReadableByOthersIsWrongUsageAndTheMessageHasTheRemedy) {
   std::filesystem::permissions(key("client"), std::filesystem::perms(0644));
-  const Outcome outcome = ask({"status"}, key("client"));
+  const Outcome outcome = run_client({"status"}, key("client"));
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr("chmod 600 '" + key("client") + "'"));
 }
@@ -138,15 +138,16 @@ TEST_F(KeysTest, AServerWithoutKeysIsReportedToPeersWithKeys) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("has no keys"));
   const Worker worker(folder_, open.worker_url(), {"--keys", key("worker")});
-  wait_until_said(worker, "has no keys");
+  wait_until_printed(worker, "has no keys");
 }
 
 TEST_F(KeysTest, ARefusedWorkerReportsTheReasonAndRetriesSlowly) {
   const auto client = worker_with(key("client"));
-  wait_until_said(*client, "it is for clients, and this port is for workers: trying again in 2 s");
+  wait_until_printed(*client,
+                     "it is for clients, and this port is for workers: trying again in 2 s");
   const Worker keyless(folder_, server_->worker_url());
-  wait_until_said(keyless, "requires a key, and none was given");
-  wait_until_said(*client, "trying again in 4 s");
+  wait_until_printed(keyless, "requires a key, and none was given");
+  wait_until_printed(*client, "trying again in 4 s");
 }
 
 TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
@@ -157,7 +158,7 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
   EXPECT_THAT(change_keys({"list"}).out, Not(HasSubstr("late")));
   const auto worker = worker_with(key("late"));
-  wait_until_said(*worker, "did not accept this key");
+  wait_until_printed(*worker, "did not accept this key");
   // `keys add --public` adds the public key of the file `late` to the list again.
   std::string line;
   std::ifstream file(key("late"));
@@ -165,21 +166,21 @@ TEST_F(KeysTest, AWorkerJoinsWhenItsKeyIsAddedAndLeavesWhenItIsRevoked) {
   }
   const std::string public_key = line.substr(10, 40);
   ASSERT_EQ(change_keys({"add", "late", "--role", "worker", "--public", public_key}).exit_code, 0);
-  wait_until_said(*worker, "welcomed as worker");
+  wait_until_printed(*worker, "welcomed as worker");
   ASSERT_EQ(change_keys({"revoke", "late"}).exit_code, 0);
-  wait_until_said(server_->process(), "revoked: late");
-  wait_until("the worker is told", [&] {
-    const std::string said = worker->err();
-    return said.find("did not accept this key", said.find("welcomed as worker")) !=
+  wait_until_printed(server_->process(), "revoked: late");
+  wait_until("the worker reports the refusal", [&] {
+    const std::string output = worker->err();
+    return output.find("did not accept this key", output.find("welcomed as worker")) !=
            std::string::npos;
   });
 }
 
 TEST_F(KeysTest, AWatchingClientReportsThatItsKeyIsRevoked) {
-  ASSERT_EQ(ask(kFewPoints, key("client")).exit_code, 0);
+  ASSERT_EQ(run_client(kFewPoints, key("client")).exit_code, 0);
   Process watching(folder_, client_program(),
                    {"watch", "few", "--server", server_->client_url(), "--keys", key("reader")});
-  wait_until_said(watching, "waits for a worker");
+  wait_until_printed(watching, "waits for a worker");
   ASSERT_EQ(change_keys({"revoke", "reader"}).exit_code, 0);
   EXPECT_EQ(watching.wait(), 1);
   EXPECT_THAT(watching.err(), HasSubstr("is not in the server's list"));
@@ -227,10 +228,10 @@ TEST_F(KeysTest, TheSubfolderKeysIsUsedIfTheCurrentFolderHasNoKeys) {
 
 TEST_F(KeysTest, SubmittingAgainReportsTheNewPriority) {
   const auto worker = worker_with(key("worker"));
-  EXPECT_THAT(ask(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
+  EXPECT_THAT(run_client(kFewPoints, key("client")).out, Not(HasSubstr("priority")));
   auto again = kFewPoints;
   again.insert(again.end(), {"--priority", "5", "--limit", "2"});
-  const Outcome outcome = ask(again, key("client"));
+  const Outcome outcome = run_client(again, key("client"));
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("its priority is now 5"));
   EXPECT_THAT(outcome.err, HasSubstr("More: oblique query few --server " + server_->client_url() +

@@ -59,7 +59,7 @@ class ComparisonTest : public ::testing::Test {
   KillStudy study_;
 };
 
-TEST_F(ComparisonTest, FindsDifferencesThatMustNotBeAndNoOthers) {
+TEST_F(ComparisonTest, FindsExactlyTheDifferencesThatAreNotAllowed) {
   EXPECT_EQ(difference_after("SELECT 1"), "");
   EXPECT_EQ(difference_after("UPDATE results SET attempt = 7, wall_s = 1, solved_at = 'then'"), "");
   // Selects the 300th stored point, because a filter leaves out some point numbers.

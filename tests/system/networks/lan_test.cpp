@@ -155,26 +155,26 @@ class BrokenLines : public StudyOnLan {
   }
 };
 
-TEST_F(BrokenLines, TheServersCableIsPulledForTenSeconds) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServersCableIsPulledForTenSeconds) {
   expect_completion_after([this] { pull_for(*server_host_, seconds(10)); });
 }
 
-TEST_F(BrokenLines, TheCableOfTheOnlyWorkerIsPulledForTenSeconds) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheCableOfTheOnlyWorkerIsPulledForTenSeconds) {
   expect_completion_after([this] { pull_for(*worker_hosts_[0], seconds(10)); }, 1);
 }
 
-TEST_F(BrokenLines, TheServersCableIsPulledForLessTimeThanALeaseLasts) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServersCableIsPulledForLessTimeThanALeaseLasts) {
   expect_completion_after([this] { pull_for(*server_host_, milliseconds(1500)); });
 }
 
-TEST_F(BrokenLines, FivePercentOfThePacketsAreLostInBothDirections) {
+TEST_F(BrokenLines, AStudyCompletesAlthoughFivePercentOfThePacketsAreLost) {
   for (const Host* host : {server_host_, worker_hosts_[0], worker_hosts_[1], client_host_}) {
     host->lose_percent(5);
   }
   expect_completion_after([] {});
 }
 
-TEST_F(BrokenLines, AWorkerIsCutOffSilentlyAndRestarted) {
+TEST_F(BrokenLines, AStudyCompletesAfterAWorkerIsCutOffSilentlyAndRestarted) {
   expect_completion_after([this] {
     worker_hosts_[0]->lose_everything();
     workers_[0]->send(SIGKILL);
@@ -184,7 +184,7 @@ TEST_F(BrokenLines, AWorkerIsCutOffSilentlyAndRestarted) {
   });
 }
 
-TEST_F(BrokenLines, TheServerIsCutOffSilentlyForTenSeconds) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServerIsCutOffSilentlyForTenSeconds) {
   expect_completion_after([this] {
     server_host_->lose_everything();
     std::this_thread::sleep_for(seconds(10));
@@ -192,7 +192,7 @@ TEST_F(BrokenLines, TheServerIsCutOffSilentlyForTenSeconds) {
   });
 }
 
-TEST_F(BrokenLines, TheServersMachineGoesDownSilentlyAndComesBack) {
+TEST_F(BrokenLines, AStudyCompletesAfterTheServersMachineGoesDownSilentlyAndComesBack) {
   expect_completion_after([this] {
     server_host_->pull_cable();
     server_->process().send(SIGKILL);
@@ -207,25 +207,25 @@ TEST_F(BrokenLines, TheServersMachineGoesDownSilentlyAndComesBack) {
 
 using ChangedAddresses = StudyOnLan;
 
-TEST_F(ChangedAddresses, TheMachineOfTheOnlyWorkerGetsAnotherAddress) {
+TEST_F(ChangedAddresses, AStudyCompletesAfterTheMachineOfTheOnlyWorkerGetsAnotherAddress) {
   expect_completion_after([this] { worker_hosts_[0]->renumber(13); }, 1);
 }
 
-TEST_F(ChangedAddresses, TheClientsMachineGetsAnotherAddress) {
+TEST_F(ChangedAddresses, AStudyCompletesAfterTheClientsMachineGetsAnotherAddress) {
   start_server();
   client_ = client(submit_and_watch());
-  const auto says = [this](const std::string& words) {
+  const auto has_printed = [this](const std::string& words) {
     return client_->err().find(words) != std::string::npos;
   };
-  wait_until("the client watches", [&] { return says("waits for a worker"); });
+  wait_until("the client watches", [&] { return has_printed("waits for a worker"); });
   client_host_->renumber(15);
   const auto renumbered = std::chrono::steady_clock::now();
-  wait_until("the client receives replies again", [&] { return says("answers again"); });
+  wait_until("the client receives replies again", [&] { return has_printed("answers again"); });
   print_measured("the client receives replies again after", renumbered);
   expect_completion_after([] {});
 }
 
-TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
+TEST_F(ChangedAddresses, AStudyCompletesAfterTheServersMachineGetsAnotherAddressUnderItsName) {
   lan_->set_addresses("coordinator", {server_host_->v4()});
   server_name_ = "coordinator";
   expect_completion_after([this] {
@@ -236,10 +236,9 @@ TEST_F(ChangedAddresses, TheServersMachineGetsAnotherAddressUnderItsName) {
 
 TEST_F(ChangedAddresses, ANameWithoutAddressIsReported) {
   server_name_ = "nowhere";
-  const Outcome asked = client({"status", "--timeout", "0.2"})->outcome();
-  EXPECT_EQ(asked.exit_code, 1);
-  EXPECT_NE(asked.err.find("the name nowhere has no address"), std::string::npos)
-      << asked.err;
+  const Outcome status = client({"status", "--timeout", "0.2"})->outcome();
+  EXPECT_EQ(status.exit_code, 1);
+  EXPECT_NE(status.err.find("the name nowhere has no address"), std::string::npos) << status.err;
 }
 
 using IPv6 = StudyOnLan;
@@ -327,12 +326,12 @@ class PlainText : public StudyOnLan {
     workers_.push_back(
         worker_on(*worker_hosts_[0]));  // the worker's first message contains its name, worker1
     using Words = std::vector<std::string>;
-    for (const Words& asked :
+    for (const Words& words :
          {Words{"submit", "--watch", "--name", "conspicuous", "--preset", "paper", "--H", "1",
                 "--mu", "1.2", "--e", "1"},
           Words{"query", "conspicuous", "--select", "fn_peak_N,mode", "--where", "e > 0.95"},
           Words{"sql", "SELECT count(*) FROM runs"}, Words{"workers"}}) {
-      const Outcome ran = client(asked)->outcome();
+      const Outcome ran = client(words)->outcome();
       EXPECT_EQ(ran.exit_code, 0) << ran.err;
     }
     return capture.bytes();
@@ -354,7 +353,7 @@ TEST_F(PlainText, IsReadableOnTheNetworkWithoutKeys) {
 
 TEST_F(PlainText, IsNotReadableOnTheNetworkWithKeys) {
   const std::string bytes = captured();
-  ASSERT_THAT(bytes.find("CURVE"), Not(std::string::npos)) << "nothing was captured";
+  ASSERT_THAT(bytes.find("CURVE"), Not(std::string::npos)) << "no packets were captured";
   for (const std::string& words : revealing_texts_) {
     EXPECT_EQ(bytes.find(words), std::string::npos) << words;
   }
@@ -420,7 +419,7 @@ class ReadmeCommands : public StudyOnLan {
   TemporaryFolder elsewhere_;
 };
 
-TEST_F(ReadmeCommands, FiveOfThemLeadFromTheFirstKeyToTheFirstResultOfAnotherMachine) {
+TEST_F(ReadmeCommands, FiveCommandsLeadFromNewKeysToAResultOfAnotherMachine) {
   const std::string text = readme();
   std::ofstream(elsewhere_.file("first.toml")) << block_after(text, "## A study", "toml");
   const auto commands = commands_of(block_after(text, "## More than one machine", ""));
@@ -436,7 +435,7 @@ TEST_F(ReadmeCommands, FiveOfThemLeadFromTheFirstKeyToTheFirstResultOfAnotherMac
     last = process->outcome();
     ASSERT_EQ(last.exit_code, 0) << typed.command << "\n" << last.err;
   }
-  EXPECT_EQ(stay.size(), 2U) << "a server and a worker";
+  EXPECT_EQ(stay.size(), 2U) << "expected a server and a worker";
   EXPECT_THAT(last.out, HasSubstr("fn_peak_N"));
   EXPECT_THAT(last.out, HasSubstr("solved"));
 }

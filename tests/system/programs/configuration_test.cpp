@@ -82,9 +82,9 @@ TEST(ConfigurationOfProgramsTest, LimitsOfTheServerArePrintedAndWrongOnesRefused
     const std::string value = key == "waiting-out-bytes" ? "20000000" : "200";
     EXPECT_NE(printed(value).find(" = " + value + "\n"), std::string::npos) << printed(value);
     for (const char* wrong : {"-1", "0", "1.5", "99999999999999999999", "all"}) {
-      const std::string said = printed(wrong);
-      EXPECT_TRUE(said.starts_with("2 ")) << said;
-      EXPECT_NE(said.find("--limits-" + key), std::string::npos) << said;
+      const std::string output = printed(wrong);
+      EXPECT_TRUE(output.starts_with("2 ")) << output;
+      EXPECT_NE(output.find("--limits-" + key), std::string::npos) << output;
     }
   }
 }
@@ -96,10 +96,10 @@ TEST(ConfigurationOfProgramsTest, HelpNamesTheVariableOfAnOptionAtItsEnd) {
            {worker_program(), "(--log-level: OBLIQUE_WORKER_LOG_LEVEL)"}}) {
     Process process(folder, program, {"--help"});
     EXPECT_EQ(process.wait(), 0);
-    const auto said = process.out().find(words);
-    ASSERT_NE(said, std::string::npos) << process.out();
-    EXPECT_GT(said, process.out().rfind("\n  --"));
-    EXPECT_NE(process.out().find("--print-config shows", said), std::string::npos);
+    const auto output = process.out().find(words);
+    ASSERT_NE(output, std::string::npos) << process.out();
+    EXPECT_GT(output, process.out().rfind("\n  --"));
+    EXPECT_NE(process.out().find("--print-config shows", output), std::string::npos);
   }
 }
 

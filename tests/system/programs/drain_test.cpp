@@ -72,7 +72,7 @@ class DrainTest : public testing::Test {
                        {"status", "study", "--server", server_.client_url(), "--format", "json"});
   }
   void wait_until_leased() {
-    wait_until("a batch is with the worker", [&] {
+    wait_until("the worker has a batch", [&] {
       return status().out.find("\"leased\":0") == std::string::npos &&
              status().out.find("\"leased\": 0") == std::string::npos;
     });
@@ -88,7 +88,7 @@ TEST_F(DrainTest, WaitsForRunningBatchesAndReportsThisToClientsAndSystemd) {
   Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
   wait_until_leased();
   server_.process().send(SIGTERM);
-  wait_until("it drains", [&] { return manager_.received("STATUS=draining"); });
+  wait_until("the server drains", [&] { return manager_.received("STATUS=draining"); });
   EXPECT_TRUE(manager_.received("STOPPING=1"));
   const Outcome refused =
       run_oblique(folder_, {"submit", "--server", server_.client_url(), "--preset", "paper", "--H",
@@ -102,18 +102,18 @@ TEST_F(DrainTest, WaitsForRunningBatchesAndReportsThisToClientsAndSystemd) {
   EXPECT_NE(log.find(" drained: "), std::string::npos) << log;
 }
 
-TEST_F(DrainTest, ASecondSignalEndsItAtOnce) {
+TEST_F(DrainTest, ASecondSignalEndsADrainAtOnce) {
   submit();
   Worker worker(folder_, server_.worker_url(), {"--threads", "1"});
   wait_until_leased();
   server_.process().send(SIGTERM);
-  wait_until("it drains", [&] { return manager_.received("STATUS=draining"); });
+  wait_until("the server drains", [&] { return manager_.received("STATUS=draining"); });
   server_.process().send(SIGINT);
   EXPECT_EQ(server_.process().wait(), 0);
   EXPECT_EQ(server_.process().err().find(" drained: "), std::string::npos);
 }
 
-TEST_F(DrainTest, EndsAtOnceWithoutRunningBatches) {
+TEST_F(DrainTest, ADrainEndsAtOnceWithoutRunningBatches) {
   server_.process().send(SIGTERM);
   EXPECT_EQ(server_.process().wait(), 0);
   EXPECT_NE(server_.process().err().find(" drained: "), std::string::npos);
@@ -125,11 +125,11 @@ TEST_F(DrainTest, ServerAndWorkerNotifySystemdOfReadinessAndFeedItsWatchdog) {
   Manager of_worker(folder_, "of_worker");
   Worker worker(folder_, server.worker_url(), {}, of_worker.watching());
   for (Manager* manager : {&of_server, &of_worker}) {
-    wait_until("it is ready", [&] { return manager->received("READY=1"); });
-    wait_until("it lives", [&] { return manager->received("WATCHDOG=1"); });
+    wait_until("READY=1 is received", [&] { return manager->received("READY=1"); });
+    wait_until("WATCHDOG=1 is received", [&] { return manager->received("WATCHDOG=1"); });
   }
   worker.send(SIGTERM);
-  wait_until("it stops", [&] { return of_worker.received("STOPPING=1"); });
+  wait_until("the worker sends STOPPING=1", [&] { return of_worker.received("STOPPING=1"); });
   EXPECT_EQ(worker.wait(), 0);
 }
 

@@ -93,7 +93,7 @@ TEST_F(LeavingProgramTest, AWorkerExitsBeforeTheTimeOfUntil) {
   EXPECT_NE(server_.process().err().find(" leaves"), std::string::npos);
 }
 
-TEST_F(LeavingProgramTest, AnIdleWorkerLeaves) {
+TEST_F(LeavingProgramTest, AWorkerExitsAfterItsLimitOfIdleTime) {
   Worker worker(folder_, server_.worker_url(), {"--idle-exit", "3"});
   EXPECT_EQ(worker.wait(), 0) << worker.err();
   EXPECT_NE(worker.err().find("no work for 3 s: leaving (--idle-exit)"), std::string::npos)
@@ -116,9 +116,9 @@ TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
   EXPECT_EQ(refused.wait(),
             1);  // 5 s end after the first attempt, which takes 3 s, and before the second ends
-  const std::string said = refused.err();
-  EXPECT_NE(said.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << said;
-  EXPECT_EQ(said.find("no server answers"), said.rfind("no server answers")) << said;
+  const std::string output = refused.err();
+  EXPECT_NE(output.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << output;
+  EXPECT_EQ(output.find("no server answers"), output.rfind("no server answers")) << output;
 }
 
 TEST(LeavingFlagsTest, InvalidValuesAreWrongUsage) {

@@ -31,14 +31,14 @@ class Browser {
  public:
   explicit Browser(const std::string& address)
       : url_(address.substr(0, address.find("/?"))), host_(url_.substr(url_.find("//") + 2)) {
-    const std::string answer = ask(address.substr(url_.size()));
+    const std::string answer = request(address.substr(url_.size()));
     const std::string name = "Set-Cookie: ";
     const std::size_t at = answer.find(name) + name.size();
     cookie_ = answer.substr(at, answer.find(';', at) - at);
   }
-  std::string ask(const std::string& path) const {
-    return RawHttp(url_).ask("GET " + path + " HTTP/1.1\r\nHost: " + host_ +
-                             "\r\nCookie: " + cookie_ + "\r\n\r\n");
+  std::string request(const std::string& path) const {
+    return RawHttp(url_).exchange("GET " + path + " HTTP/1.1\r\nHost: " + host_ +
+                                  "\r\nCookie: " + cookie_ + "\r\n\r\n");
   }
 
  private:
@@ -55,11 +55,11 @@ TEST(View, ShowsADatabaseAndItsPointsUntilItIsStopped) {
   ASSERT_EQ(made.exit_code, 0) << made.err;
   Process view(folder, client_program(), {"view", "small.db"});
   const Browser browser(printed_url(view));
-  EXPECT_THAT(browser.ask("/"), HasSubstr("Content-Type: text/html"));
-  EXPECT_THAT(browser.ask("/api/studies"), HasSubstr("\"name\":\"small\""));
+  EXPECT_THAT(browser.request("/"), HasSubstr("Content-Type: text/html"));
+  EXPECT_THAT(browser.request("/api/studies"), HasSubstr("\"name\":\"small\""));
   std::string trace;
   wait_until("a worker has solved the point again", [&] {
-    trace = browser.ask("/api/studies/1/points/2/trace?shape=1&fall=1");
+    trace = browser.request("/api/studies/1/points/2/trace?shape=1&fall=1");
     return status_of_answer(trace) == 200;
   });
   EXPECT_THAT(body_of(trace), HasSubstr("\"nodes\":13"));

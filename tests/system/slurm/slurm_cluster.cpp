@@ -64,7 +64,7 @@ PartitionName=urgent Nodes=ALL State=UP PriorityTier=100
 
 }  // namespace
 
-std::string SlurmCluster::objection() {
+std::string SlurmCluster::unavailable_reason() {
   for (const char* program : {"munged", "slurmctld", "slurmd", "sbatch", "srun", "squeue",
                               "scancel", "scontrol", "sinfo", "setpriv"}) {
     if (installed(program).empty()) {
@@ -163,11 +163,11 @@ std::unique_ptr<Process> SlurmCluster::started(const std::string& program,
 
 void SlurmCluster::wait_for_nodes() const {
   wait_until("Slurm's nodes are idle; its log: " + log(), [this] {
-    const auto asked =
+    const auto states =
         Process(folder_, installed("sinfo"), {"-h", "-N", "-p", "work", "-o", "%T"}, environment())
             .outcome();
     usleep(50'000);
-    return asked.out == "idle\nidle\n";
+    return states.out == "idle\nidle\n";
   });
 }
 

@@ -18,7 +18,7 @@ namespace oblique::test {
 class SlurmCluster {
  public:
   /// Returns the reason why Slurm cannot run here; empty if it can.
-  static std::string objection();
+  static std::string unavailable_reason();
 
   /// Starts the daemons and waits until all nodes are idle.
   explicit SlurmCluster(const TemporaryFolder& folder);

@@ -28,8 +28,9 @@ namespace {
 class SlurmTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (const auto objection = SlurmCluster::objection(); !objection.empty()) {
-      GTEST_SKIP() << "no Slurm here: " << objection;
+    if (const auto unavailable_reason = SlurmCluster::unavailable_reason();
+        !unavailable_reason.empty()) {
+      GTEST_SKIP() << "Slurm cannot be used: " << unavailable_reason;
     }
     cluster_.emplace(folder_);
     const auto made = run_oblique(folder_, {"keygen", folder_.file("keys")});
@@ -243,7 +244,7 @@ TEST_F(SlurmAutoscaleTest, JobsStartForAStudyAndEndByThemselvesWhenItIsDone) {
   EXPECT_NE(scaling.err().find("submitting 2 jobs"), std::string::npos) << scaling.err();
 }
 
-TEST_F(SlurmAutoscaleTest, AfterItIsStoppedItsJobsContinueAndTheNextAutoscalerCountsThem) {
+TEST_F(SlurmAutoscaleTest, JobsOfAStoppedAutoscalerContinueAndTheNextAutoscalerCountsThem) {
   {
     Process scaling(folder_, client_program(), autoscale({"--min", "2", "--max", "2"}),
                     environment());
@@ -262,8 +263,9 @@ TEST_F(SlurmAutoscaleTest, AfterItIsStoppedItsJobsContinueAndTheNextAutoscalerCo
 class SlurmCampaignTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (const auto objection = SlurmCluster::objection(); !objection.empty()) {
-      GTEST_SKIP() << "no Slurm here: " << objection;
+    if (const auto unavailable_reason = SlurmCluster::unavailable_reason();
+        !unavailable_reason.empty()) {
+      GTEST_SKIP() << "Slurm cannot be used: " << unavailable_reason;
     }
     for (const char* part : {"server", "worker", "client"}) {
       Process install(folder_, "/usr/bin/env",

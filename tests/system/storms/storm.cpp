@@ -46,7 +46,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
   protocol::WorkerMessage hello;
   protocol::set_protocol(*hello.mutable_hello());
   hello.mutable_hello()->set_solver_version(solver_version);
-  hello.mutable_hello()->set_name("pretended");
+  hello.mutable_hello()->set_name("fake");
   hello.mutable_hello()->set_threads(1);
   hello.mutable_hello()->set_process_id("vanishing " + std::to_string(number));
   protocol::WorkerMessage credit;

@@ -158,19 +158,19 @@ TEST_F(PageStudyTest, BinsCountEveryPointOnce) {
   EXPECT_EQ(some.head["outside"], 12);
   const Numbers met = bins_of("x=mu&nx=2&where=mu%20%3C%200.3");
   EXPECT_EQ(met.head["points"], 12);
-  EXPECT_EQ(met.head["x"]["most"], 0.2) << "of those that are counted";
+  EXPECT_EQ(met.head["x"]["most"], 0.2) << "the range spans only points that meet the condition";
   EXPECT_EQ(met.read<std::uint32_t>(0, 2), (std::vector<std::uint32_t>{6, 6}));
   EXPECT_EQ(bins_of("x=mu&nx=2&where=0").head["points"], 0);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mode"), 400);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mu&xlog=1&x0=0"), 400);
 }
 
-TEST_F(PageStudyTest, TypedEndsAreInsideTheBins) {
+TEST_F(PageStudyTest, BinsIncludeTheRequestedEnds) {
   solve_grid();
   const std::string bins = "/api/studies/1/bins?x=mu&nx=2&";
   for (const std::string log : {"", "&xlog=1"}) {
     const Numbers typed = page_.numbers(bins + "x0=0.2&x1=0.6" + log);
-    EXPECT_EQ(typed.head["points"], 18) << log << ": 0.6 / 3 is another double than 0.2";
+    EXPECT_EQ(typed.head["points"], 18) << log << ": 0.6 / 3 differs from 0.2 by rounding";
     EXPECT_EQ(typed.head["x"]["least"], 0.2);
     EXPECT_EQ(typed.head["x"]["most"], 0.6);
   }
@@ -179,7 +179,7 @@ TEST_F(PageStudyTest, TypedEndsAreInsideTheBins) {
   EXPECT_EQ(page_.numbers(bins + "x0=1e-300&x1=1e300&xlog=1").head["points"], 18);
 }
 
-TEST_F(PageStudyTest, BinsWithoutPointsHaveTheTypedEnds) {
+TEST_F(PageStudyTest, BinsWithoutPointsHaveTheRequestedEnds) {
   submit_grid();
   const std::string bins = "/api/studies/1/bins?x=fn_peak_N";
   EXPECT_EQ(page_.numbers(bins + "&x0=2").head["x"]["most"], 2);
@@ -234,7 +234,8 @@ TEST_F(PageStudyTest, AConditionFollowsTheQueryLanguage) {
       const std::string answer = page_.get("/api/studies/1/" + picture + "&where=" + condition);
       EXPECT_EQ(status_of_answer(answer), 400) << picture << condition;
       EXPECT_THAT(answer, HasSubstr(sentence)) << picture;
-      EXPECT_THAT(answer, testing::Not(HasSubstr("e = 0"))) << "not what was added to it";
+      EXPECT_THAT(answer, testing::Not(HasSubstr("e = 0")))
+          << "the error must not contain the server's own condition";
     }
     EXPECT_EQ(page_.status("/api/studies/9/" + picture + "&where=1"), 404);
   }

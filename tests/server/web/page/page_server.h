@@ -40,7 +40,7 @@ struct Numbers {
   std::vector<Number> read(std::size_t from_byte, std::size_t count) const {
     std::vector<Number> numbers(count);
     if (from_byte + count * sizeof(Number) > bytes.size()) {
-      throw std::runtime_error("there are fewer numbers");
+      throw std::runtime_error("the answer contains fewer numbers than expected");
     }
     std::memcpy(numbers.data(), bytes.data() + from_byte, count * sizeof(Number));
     return numbers;
@@ -53,7 +53,7 @@ class PageServer {
   explicit PageServer(const WebSettings& web = page_settings(), const std::string& database = {})
       : database_(database.empty() ? folder_.file("a.db") : database),
         server_(database_, {}, {}, {}, {}, web) {
-    const std::string answer = ask("GET", std::string("/?token=") + kTestToken, "");
+    const std::string answer = request("GET", std::string("/?token=") + kTestToken, "");
     const std::string name = "Set-Cookie: ";
     const std::size_t at = answer.find(name);
     if (at != std::string::npos) {
@@ -67,13 +67,13 @@ class PageServer {
   std::string host() const { return url().substr(std::string("http://").size()); }
   std::string cookie_header() const { return "Cookie: " + cookie_ + "\r\n"; }
 
-  std::string ask(const std::string& method, const std::string& path, const std::string& headers,
-                  const std::string& body = "") const {
-    return RawHttp(url()).ask(method + " " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" +
-                              headers + "\r\n" + body);
+  std::string request(const std::string& method, const std::string& path,
+                      const std::string& headers, const std::string& body = "") const {
+    return RawHttp(url()).exchange(method + " " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" +
+                                   headers + "\r\n" + body);
   }
   /// Sends a request with the cookie that the page received.
-  std::string get(const std::string& path) const { return ask("GET", path, cookie_header()); }
+  std::string get(const std::string& path) const { return request("GET", path, cookie_header()); }
   int status(const std::string& path) const { return status_of_answer(get(path)); }
   /// Sends a request; the caller reads the answer.
   std::unique_ptr<RawHttp> begin(const std::string& path) const {
@@ -86,17 +86,17 @@ class PageServer {
     return nlohmann::json::parse(body_of(get(path)));
   }
   std::string post(const std::string& path, const std::string& body = "{}") const {
-    return ask("POST", path,
-               cookie_header() + "Origin: " + url() +
-                   "\r\nSec-Fetch-Site: same-origin\r\nContent-Length: " +
-                   std::to_string(body.size()) + "\r\n",
-               body);
+    return request("POST", path,
+                   cookie_header() + "Origin: " + url() +
+                       "\r\nSec-Fetch-Site: same-origin\r\nContent-Length: " +
+                       std::to_string(body.size()) + "\r\n",
+                   body);
   }
   Numbers numbers(const std::string& path) const {
     const std::string body = body_of(get(path));
     std::uint32_t length = 0;
     if (body.size() < sizeof length) {
-      throw std::runtime_error("the answer has no head: " + body);
+      throw std::runtime_error("the answer has no JSON header: " + body);
     }
     std::memcpy(&length, body.data(), sizeof length);
     return {nlohmann::json::parse(body.substr(sizeof length, length)),
@@ -122,7 +122,7 @@ class PageStudyTest : public testing::Test {
     ClientRequest request;
     request.mutable_submit()->set_name(name);
     *request.mutable_submit()->mutable_recipe() = recipe;
-    ASSERT_TRUE(client_.ask(request).has_submit());
+    ASSERT_TRUE(client_.reply_to(request).has_submit());
   }
   void solve(std::uint64_t points, const std::set<std::uint64_t>& failing = {}) {
     SimulatedWorker worker(page_.server().worker_endpoint());

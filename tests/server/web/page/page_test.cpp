@@ -23,7 +23,7 @@ using testing::StartsWith;
 
 TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   const PageServer page;
-  const std::string answer = page.ask("GET", std::string("/?token=") + kTestToken, "");
+  const std::string answer = page.request("GET", std::string("/?token=") + kTestToken, "");
   EXPECT_EQ(status_of_answer(answer), 303);
   EXPECT_THAT(answer, HasSubstr("Location: /\r\n"));
   EXPECT_THAT(answer, HasSubstr("; Path=/; HttpOnly; SameSite=Strict\r\n"));
@@ -31,19 +31,19 @@ TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   EXPECT_EQ(page.json("/api/session")["may_change"], true);
   for (const std::string token :
        {"", "0", "0123456789abcdef0123456789abcdeg", "0123456789abcdef0123456789abcdef0", "%01"}) {
-    const std::string refused = page.ask("GET", "/?token=" + token, "");
+    const std::string refused = page.request("GET", "/?token=" + token, "");
     EXPECT_EQ(status_of_answer(refused), 403) << token;
     EXPECT_THAT(refused, Not(HasSubstr("Set-Cookie"))) << token;
   }
 }
 
-TEST(PageAccess, OnlyAViewOfAFileNamesItAndOnlyWithAccess) {
+TEST(PageAccess, OnlyAViewOfAFileShowsTheFileNameAndOnlyWithAccess) {
   EXPECT_EQ(PageServer().json("/api/session")["file"], "");
   WebSettings web = page_settings();
   web.page.is_of_file = true;
   const PageServer page(web);
   EXPECT_EQ(page.json("/api/session")["file"], page.database());
-  EXPECT_EQ(nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")))["file"], "");
+  EXPECT_EQ(nlohmann::json::parse(body_of(page.request("GET", "/api/session", "")))["file"], "");
 }
 
 TEST(PageAccess, WithoutTheCookieNothingIsReadable) {
@@ -58,27 +58,29 @@ TEST(PageAccess, WithoutTheCookieNothingIsReadable) {
           right.substr(0, right.size() - 3) + "\r\n",
           "Cookie: oblique-1" + right.substr(right.find('=')),
           "Cookie: x" + right.substr(std::string("Cookie: ").size())}) {
-      const std::string answer = page.ask("GET", path, cookies);
+      const std::string answer = page.request("GET", path, cookies);
       EXPECT_EQ(status_of_answer(answer), 401) << path << ' ' << cookies;
       EXPECT_THAT(answer, HasSubstr("token")) << path;
     }
   }
-  EXPECT_EQ(nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")))["may_look"], false);
+  EXPECT_EQ(nlohmann::json::parse(body_of(page.request("GET", "/api/session", "")))["may_look"],
+            false);
   const std::string pair = right.substr(std::string("Cookie: ").size(), right.size() - 10);
   for (const std::string& cookies : {"Cookie: a=b; " + pair, "Cookie: " + pair + "; a=b",
                                      "Cookie: a;;  " + pair + ";", "cookie: a=b;" + pair}) {
-    EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", cookies + "\r\n")), 200) << cookies;
+    EXPECT_EQ(status_of_answer(page.request("GET", "/api/studies", cookies + "\r\n")), 200)
+        << cookies;
   }
 }
 
 TEST(PageAccess, ReadingMayBeAllowedWithoutTheToken) {
   const PageServer page(page_settings(true));
-  const auto session = nlohmann::json::parse(body_of(page.ask("GET", "/api/session", "")));
+  const auto session = nlohmann::json::parse(body_of(page.request("GET", "/api/session", "")));
   EXPECT_EQ(session["may_look"], true);
   EXPECT_EQ(session["may_change"], false);
-  EXPECT_EQ(status_of_answer(page.ask("GET", "/api/studies", "")), 200);
-  EXPECT_EQ(status_of_answer(page.ask("POST", "/api/studies/1/pause",
-                                      "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
+  EXPECT_EQ(status_of_answer(page.request("GET", "/api/studies", "")), 200);
+  EXPECT_EQ(status_of_answer(page.request("POST", "/api/studies/1/pause",
+                                          "Origin: " + page.url() + "\r\nContent-Length: 0\r\n")),
             401);
 }
 
@@ -117,7 +119,7 @@ TEST(PageAccess, WrongRequestsAreRefused) {
     rows.push_back({"GET", path, page.cookie_header(), 400});
   }
   for (const Row& row : rows) {
-    EXPECT_EQ(status_of_answer(page.ask(row.method, row.path, row.headers)), row.status)
+    EXPECT_EQ(status_of_answer(page.request(row.method, row.path, row.headers)), row.status)
         << row.method << ' ' << row.path << ' ' << row.headers;
   }
   EXPECT_EQ(status_of_answer(page.post("/api/studies", std::string(262'144, ' '))), 400);
@@ -140,7 +142,7 @@ TEST_F(PageStudyTest, ATraceIsCancelledWhenItsBrowserDisconnects) {
 TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
   const PageServer page;
   const auto type_of = [&](const std::string& path) {
-    const std::string answer = page.ask("GET", path, "");
+    const std::string answer = page.request("GET", path, "");
     EXPECT_EQ(status_of_answer(answer), 200) << path;
     EXPECT_THAT(answer, HasSubstr("Content-Encoding: gzip\r\n"));
     EXPECT_THAT(body_of(answer), StartsWith("\x1f\x8b"));
@@ -155,10 +157,11 @@ TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
   for (const PageFile& file : page_files()) {
     const std::string path(file.path);
     const std::string known = "If-None-Match: " + std::string(file.tag) + "\r\n";
-    const std::string answer = page.ask("GET", path, known);
+    const std::string answer = page.request("GET", path, known);
     EXPECT_EQ(status_of_answer(answer), 304) << path;
     EXPECT_EQ(body_of(answer), "") << path;
-    EXPECT_EQ(status_of_answer(page.ask("GET", path, "If-None-Match: \"other\"\r\n")), 200) << path;
+    EXPECT_EQ(status_of_answer(page.request("GET", path, "If-None-Match: \"other\"\r\n")), 200)
+        << path;
   }
 }
 
@@ -244,7 +247,7 @@ TEST_F(PageStudyTest, TheOverviewIsSentOnceAndThenAfterChanges) {
   EXPECT_EQ(now["studies_by_state"]["running"], 1);
 }
 
-TEST_F(PageStudyTest, AStudyIsItsRecipeAndColumns) {
+TEST_F(PageStudyTest, TheAnswerForAStudyHasItsRecipeAndColumns) {
   submit_grid();
   const json study = page_.json("/api/studies/1");
   EXPECT_EQ(study["name"], "grid");
@@ -266,7 +269,7 @@ TEST_F(PageStudyTest, AStudyIsItsRecipeAndColumns) {
   EXPECT_EQ(columns["mode"]["picture"], "categories");
 }
 
-TEST_F(PageStudyTest, StudiesAndWorkersAreListedAndOthersAreNotFound) {
+TEST_F(PageStudyTest, StudiesAndWorkersAreListedAndUnknownOnesAreNotFound) {
   submit_grid();
   EXPECT_EQ(page_.json("/api/studies")["studies"][0]["name"], "grid");
   EXPECT_EQ(page_.json("/api/studies?after=1")["studies"].size(), 0U);
@@ -365,7 +368,7 @@ TEST_F(PageStudyTest, AStudyIsCheckedBeforeItIsSubmitted) {
   EXPECT_EQ(all["models"], 1);
   EXPECT_EQ(all["falls"], 1);
   EXPECT_EQ(all["falls_estimated"], false);
-  EXPECT_EQ(all["bytes"], 11 * 970 + 600) << "as of oblique study check";
+  EXPECT_EQ(all["bytes"], 11 * 970 + 600) << "the same estimate as `oblique study check` gives";
   const json some = json::parse(body_of(check(R"("from":0,"to":1,"count":11)", "mu > 0.45")));
   EXPECT_EQ(some["points"], 6);
   const std::string wrong = check(R"("values":[-1])", "");
@@ -389,7 +392,7 @@ TEST_F(PageStudyTest, ADropAboveTheLengthIsRefusedAndAnUncertainOneIsReported) {
   EXPECT_EQ(reached_m(R"("from":0.1,"to":1.08,"count":9)"), json());
   EXPECT_DOUBLE_EQ(reached_m(R"("from":0.1,"to":1.19,"count":9)"), 1.08);
   EXPECT_DOUBLE_EQ(reached_m(R"("values":[0.75])", R"({"key":"links","values":[2,3]},)"), 0.72)
-      << "of the shortest finger";
+      << "the shortest finger limits the drop";
   EXPECT_DOUBLE_EQ(reached_m(R"("expression":"0.5 + 0.1 * e")"), 1.08);
 }
 

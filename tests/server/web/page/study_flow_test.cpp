@@ -193,7 +193,7 @@ TEST_F(StudyFlowTest, FewTracesAreRequestedOrSentAtATime) {
   ASSERT_TRUE(answer);
   flows.front() = nullptr;
   EXPECT_FALSE(flows.back()());
-  EXPECT_THAT(requested(), IsEmpty()) << "the first is not sent yet";
+  EXPECT_THAT(requested(), IsEmpty()) << "the first query is not sent yet";
   answer.reset();
   EXPECT_FALSE(flows.back()());
   EXPECT_EQ(requested().size(), 1U);

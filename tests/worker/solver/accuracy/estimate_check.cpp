@@ -162,8 +162,8 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
                      percent * within_twice, quantile(ratios, 0.5));
 }
 
-void tell_modes(const Results& results, const Results& truth,
-                const std::vector<ErrorEstimate>& errors) {
+void print_modes(const Results& results, const Results& truth,
+                 const std::vector<ErrorEstimate>& errors) {
   std::array<std::array<int, 2>, 2> count{};  // points by [companion agrees][exact result agrees]
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
@@ -201,7 +201,7 @@ void check_mesh(const ModelParameters& model, const std::vector<solver::Point>& 
     }
     fmt::print("{}", row_of(output.name, judged));
   }
-  tell_modes(results, truth, errors);
+  print_modes(results, truth, errors);
 }
 
 void check(const Settings& settings) {

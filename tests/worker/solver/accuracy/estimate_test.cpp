@@ -224,7 +224,7 @@ TEST(SolvedWithErrors, AllOtherOutputsHaveTheSameBitsAsWithoutErrors) {
   EXPECT_EQ(estimated, 180) << "all points except those that are never reached";
 }
 
-TEST(SolvedWithErrors, AreEqualToTheErrorsOfThePointAlone) {
+TEST(SolvedWithErrors, EstimatesEqualThoseOfThePointSolvedAlone) {
   for (const std::size_t i : {0U, 95U, 239U}) {
     const auto& [finger, number, request] = mixed_points()[i];
     const Finger companion(companion_model(finger.model()));

@@ -167,15 +167,15 @@ TEST(FallCacheTest, WhileAnotherThreadSolvesAFallThisThreadSolvesTheNextFalls) {
   const auto models = models_with_E(3);
   std::latch first_is_under_way(1);
   std::latch next_are_solved(1);
-  FallCache cache(std::size_t{1} << 30, [&](std::span<const ModelParameters> asked) {
-    if (asked.front() == models[0]) {
+  FallCache cache(std::size_t{1} << 30, [&](std::span<const ModelParameters> requested) {
+    if (requested.front() == models[0]) {
       first_is_under_way.count_down();
       next_are_solved.wait();
     } else {
-      EXPECT_EQ(asked.size(), 2U);
+      EXPECT_EQ(requested.size(), 2U);
       next_are_solved.count_down();
     }
-    return solve_falls(asked);
+    return solve_falls(requested);
   });
   const std::jthread first([&] { cache.fall(models[0]); });
   first_is_under_way.wait();

@@ -23,7 +23,7 @@ std::string message_of(const std::function<void()>& action) {
   } catch (const Error& error) {
     return error.what();
   }
-  ADD_FAILURE() << "no exception of this type";
+  ADD_FAILURE() << "no exception of the expected type was thrown";
   return {};
 }
 

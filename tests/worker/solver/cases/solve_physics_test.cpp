@@ -228,7 +228,7 @@ TEST(SolveSweep, ResultsAreFinitePhysicalAndOrderedForRandomModels) {
   }
 }
 
-TEST(SolveSweep, SlowManyPointsOfThePaper) {
+TEST(SolveSweep, SlowResultsArePhysicalForThousandsOfPointsOfThePaper) {
   sweep(preset("paper"), 3000, 11);
 }
 

@@ -73,17 +73,17 @@ void expect_same_in_any_company(std::vector<FingerPoint> list) {
   }
 }
 
-TEST(SameBits, WhateverPointsWereSolvedBefore) {
+TEST(SameBits, DoNotDependOnThePointsSolvedBefore) {
   const auto list = points_of(Finger{coarse_model()});
   expect_same(solved_one_by_one({list.rbegin(), list.rend()}),
               solved_one_by_one(points_of(coarse_finger())));
 }
 
-TEST(SameBits, WhateverPointsAreInTheOtherLanes) {
+TEST(SameBits, DoNotDependOnThePointsInOtherLanes) {
   expect_same_in_any_company(points_of(coarse_finger()));
 }
 
-TEST(SameBits, OnSeveralThreadsThatShareAFinger) {
+TEST(SameBits, ResultFromThreadsThatShareAFinger) {
   const auto list = points_of(Finger{coarse_model()});
   std::vector<Results> by_thread(4);
   std::vector<std::thread> threads;
@@ -104,7 +104,7 @@ TEST(SameBits, OnSeveralThreadsThatShareAFinger) {
 
 /// Returns points numbered from 0. Some models share a fall, some have chains of the same shape,
 /// some have nothing in common.
-std::vector<FingerPoint> crowd() {
+std::vector<FingerPoint> mixed_points() {
   std::vector<ModelParameters> models(8, coarse_model());
   models[1].k_N_m = 1.3e7;
   models[2].eta2 = 2.0;
@@ -116,24 +116,24 @@ std::vector<FingerPoint> crowd() {
   models[6].dt_fall_s = 1e-4;
   models[7].dt_s = 5e-7;
   const std::vector<FallOutcome> falls = solve_falls(models);
-  std::vector<FingerPoint> crowd;
+  std::vector<FingerPoint> mixed_points;
   for (std::size_t i = 0; i < models.size(); ++i) {
     const Finger finger(models[i], falls[i].fallen);
     for (const double mu : {0.4, 1.2}) {
       for (const double e_star : {1.0, 0.6}) {
-        crowd.push_back({finger, crowd.size(), {0.9, mu, e_star}});
-        crowd.push_back({finger, crowd.size(), {0.5, mu, e_star}});
+        mixed_points.push_back({finger, mixed_points.size(), {0.9, mu, e_star}});
+        mixed_points.push_back({finger, mixed_points.size(), {0.5, mu, e_star}});
       }
     }
   }
-  return crowd;
+  return mixed_points;
 }
 
-TEST(SameBits, InAMixtureOfModels) {
-  expect_same_in_any_company(crowd());
+TEST(SameBits, ResultFromPointsOfMixedModels) {
+  expect_same_in_any_company(mixed_points());
 }
 
-TEST(SameBits, WithOrWithoutATrace) {
+TEST(SameBits, ResultWithAndWithoutATrace) {
   int rows = 0;
   Tracing tracing;
   tracing.sink = [&rows](const TraceRow&) { ++rows; };

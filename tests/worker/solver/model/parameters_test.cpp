@@ -17,7 +17,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-std::string objection_to(const ParameterKey& key, double value) {
+std::string error_for(const ParameterKey& key, double value) {
   try {
     check_value(key, value);
     return {};
@@ -65,28 +65,28 @@ TEST(Parameters, LinksKeepsTheFirstLengthAndLengthSetsAllLengths) {
 }
 
 TEST(Parameters, AForbiddenValueIsNamedWithItsUnitAndTheAllowedValues) {
-  EXPECT_THAT(objection_to(*find_model_key("rho"), -1.0),
+  EXPECT_THAT(error_for(*find_model_key("rho"), -1.0),
               AllOf(HasSubstr("rho = -1 kg/m^3 is not allowed"), HasSubstr("> 0")));
   for (const ParameterKey& key : model_keys()) {
-    EXPECT_NE(objection_to(key, std::numeric_limits<double>::quiet_NaN()), "") << key.name;
-    EXPECT_NE(objection_to(key, std::numeric_limits<double>::infinity()), "") << key.name;
-    EXPECT_NE(objection_to(key, -1.0), "") << key.name;
-    EXPECT_EQ(objection_to(key, key.get(ModelParameters{})), "") << key.name;
+    EXPECT_NE(error_for(key, std::numeric_limits<double>::quiet_NaN()), "") << key.name;
+    EXPECT_NE(error_for(key, std::numeric_limits<double>::infinity()), "") << key.name;
+    EXPECT_NE(error_for(key, -1.0), "") << key.name;
+    EXPECT_EQ(error_for(key, key.get(ModelParameters{})), "") << key.name;
   }
   for (const std::string_view counts : {"links", "elements_per_link"}) {
-    EXPECT_NE(objection_to(*find_model_key(counts), 1.5), "");
+    EXPECT_NE(error_for(*find_model_key(counts), 1.5), "");
   }
-  EXPECT_EQ(objection_to(*find_model_key("spectral_radius"), 0.0), "");
-  EXPECT_NE(objection_to(*find_model_key("spectral_radius"), 1.0), "");
+  EXPECT_EQ(error_for(*find_model_key("spectral_radius"), 0.0), "");
+  EXPECT_NE(error_for(*find_model_key("spectral_radius"), 1.0), "");
 }
 
 TEST(Parameters, ATooSmallOrTooLargeToleranceIsRefusedByName) {
   const ParameterKey& tolerance = *find_model_key("tolerance");
   for (const double allowed : {1e-9, 1e-5, 0.01}) {
-    EXPECT_EQ(objection_to(tolerance, allowed), "");
+    EXPECT_EQ(error_for(tolerance, allowed), "");
   }
   for (const double refused : {0.0, 0.99e-9, 0.0101}) {
-    EXPECT_THAT(objection_to(tolerance, refused),
+    EXPECT_THAT(error_for(tolerance, refused),
                 AllOf(HasSubstr("tolerance = "), HasSubstr("from 1e-9"), HasSubstr("to 0.01")));
   }
 }

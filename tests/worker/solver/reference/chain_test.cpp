@@ -118,7 +118,7 @@ TEST(Chain, WeighsTheSumOfItsLinksAndItsTip) {
   EXPECT_LT(chain.gravity_energy_J(-lifted), 0.0) << "gravity pulls downwards";
 }
 
-TEST(Chain, TurningAboutThePinItHasTheMomentOfInertiaOfARod) {
+TEST(Chain, RotationAboutThePinHasTheMomentOfInertiaOfARod) {
   ModelParameters model = chain_of(3, 2);
   model.tip_mass_kg = 0.3;
   const Chain chain(model);

@@ -56,7 +56,7 @@ TEST(ConstrainedChain, ConstraintsHoldForEveryStateOfTheEliminatedChain) {
   EXPECT_EQ(residual, Coordinates::Zero(2, constrained.rows()));
 }
 
-TEST(ConstrainedChain, ConstraintForcesWorkOnNothingButTheBreachOfConstraints) {
+TEST(ConstrainedChain, ConstraintForcesDoWorkOnlyOnViolationsOfConstraints) {
   // dq . (Phi_qᵀ lambda) = lambda . Phi(dq) for every displacement dq, because a joint exerts
   // opposite forces on its two links. Only the pin exerts an external force.
   const ConstrainedChain chain(three_links());

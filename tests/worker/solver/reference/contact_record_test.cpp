@@ -159,7 +159,7 @@ TEST(WithoutRipples, KeepsPeaksAndValleysThatDifferByAtLeastFivePercentOfTheLarg
   }
 }
 
-TEST(WithoutRipples, TheRestAlternatesBeginsAndEndsWithAPeakAndContainsTheLargestPeak) {
+TEST(WithoutRipples, RemainingExtremaAlternateStartAndEndWithAPeakAndContainTheLargest) {
   std::mt19937_64 generator(1);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   for (int trial = 0; trial < 500; ++trial) {

@@ -146,7 +146,7 @@ TEST(GeneralizedAlpha, AStepForWhichNewtonFailsIsASolveErrorWithItsTime) {
   ChainState next;
   try {
     moving.motion.step(moving.constrained, kNoContact, 1.0, next);
-    FAIL() << "accepted";
+    FAIL() << "the parameters were accepted";
   } catch (const SolveError& error) {
     EXPECT_THAT(error.what(), HasSubstr("step of 1 s"));
     EXPECT_THAT(error.what(), HasSubstr("at t = 1 s"));

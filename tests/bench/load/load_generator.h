@@ -10,7 +10,7 @@
 
 namespace oblique::bench {
 
-struct CrowdSettings {
+struct LoadSettings {
   std::string worker_url;
   std::size_t workers = 1;
   /// Simulated time per point; with 0, workers answer at once.
@@ -19,13 +19,14 @@ struct CrowdSettings {
 };
 
 /// Sums over all workers.
-struct CrowdCounts {
+struct LoadCounts {
   std::uint64_t batches = 0;
   std::uint64_t results = 0;   ///< produced
   std::uint64_t messages = 0;  ///< sent
   std::uint64_t connects = 0;  ///< made; more than there are workers if some reconnected
   std::uint64_t welcomed = 0;
-  /// Longest delay of the crowd's thread. If it exceeds 2 s, workers consider the server silent.
+  /// Longest delay of the generator's thread. If it exceeds 2 s, workers consider the server
+  /// silent.
   double longest_gap_s = 0.0;
 };
 
@@ -34,15 +35,15 @@ std::size_t bytes_of_result();
 
 /// Many simulated workers on one thread. Each has its own socket and follows the worker protocol,
 /// but solves nothing: it answers every point with one result, which was solved beforehand.
-class Crowd {
+class LoadGenerator {
  public:
-  explicit Crowd(const CrowdSettings& settings);
+  explicit LoadGenerator(const LoadSettings& settings);
   /// Closes all connections without saying goodbye to the server.
-  ~Crowd();
-  Crowd(const Crowd&) = delete;
-  Crowd& operator=(const Crowd&) = delete;
+  ~LoadGenerator();
+  LoadGenerator(const LoadGenerator&) = delete;
+  LoadGenerator& operator=(const LoadGenerator&) = delete;
 
-  CrowdCounts counts() const;
+  LoadCounts counts() const;
 
  private:
   class Parts;

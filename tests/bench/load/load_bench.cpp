@@ -16,8 +16,8 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/keys/key_file.h"
-#include "tests/bench/crowd/crowd.h"
-#include "tests/bench/crowd/status_probe.h"
+#include "tests/bench/load/load_generator.h"
+#include "tests/bench/load/status_probe.h"
 #include "tests/bench/process_usage.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
@@ -87,10 +87,10 @@ struct Place {
 
 /// Submits a study that is too large to be completed.
 void submit(const Place& place, const test::Server& server) {
-  std::vector<std::string> words{"submit",         "--server", server.client_url(), "--preset",
-                                 "paper",          "--H",      "0.1:1.15:1000",     "--mu",
-                                 "0.05:0.95:1000", "--e",      "0.2:1.0:1000",      "--name",
-                                 "crowd"};
+  std::vector<std::string> words{
+      "submit",        "--server", server.client_url(), "--preset", "paper",        "--H",
+      "0.1:1.15:1000", "--mu",     "0.05:0.95:1000",    "--e",      "0.2:1.0:1000", "--name",
+      "load"};
   if (!place.environment.empty()) {
     words.insert(words.end(), {"--keys", place.keys + "/client.key"});
   }
@@ -105,34 +105,35 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_k
   test::Server server(place.folder, place.folder.file("bench.db"), place.environment);
   const pid_t pid = server.process().pid();
   const Usage at_rest = usage_of(pid);
-  CrowdCounts before;
-  CrowdCounts after;
+  LoadCounts before;
+  LoadCounts after;
   Usage began;
   Usage ended;
-  double crowd_cpu_s = 0.0;
+  double generator_cpu_s = 0.0;
   double wall_s = 0.0;
   double rows = 0.0;
   StatusProbe::Seen seen;
   {
-    const Crowd crowd({server.worker_url(), workers, point_ms / 1e3, place.key("worker")});
-    wait_for("welcomes", [&] { return crowd.counts().welcomed >= workers; });
+    const LoadGenerator generator(
+        {server.worker_url(), workers, point_ms / 1e3, place.key("worker")});
+    wait_for("welcomes", [&] { return generator.counts().welcomed >= workers; });
     submit(place, server);
     wait_for("results", [&] { return database.rows() > 0.0; });
     const double rows_before = database.rows();
-    before = crowd.counts();
+    before = generator.counts();
     began = usage_of(pid);
-    crowd_cpu_s = -usage_of(getpid()).cpu_s;
+    generator_cpu_s = -usage_of(getpid()).cpu_s;
     const auto start = Clock::now();
-    StatusProbe probe(server.client_url(), place.key("client"), "crowd",
+    StatusProbe probe(server.client_url(), place.key("client"), "load",
                       std::chrono::milliseconds(100));
     while (seconds_since(start) < flags.seconds &&
-           crowd.counts().results - before.results < flags.most_results) {
+           generator.counts().results - before.results < flags.most_results) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     wall_s = seconds_since(start);
     ended = usage_of(pid);
-    crowd_cpu_s += usage_of(getpid()).cpu_s;
-    after = crowd.counts();
+    generator_cpu_s += usage_of(getpid()).cpu_s;
+    after = generator.counts();
     rows = database.rows() - rows_before;
     seen = probe.stop();
   }
@@ -150,13 +151,14 @@ void bench(const Flags& flags, std::size_t workers, double point_ms, bool with_k
       "%.0f | %.0f | %.0f | %llu |\n",
       workers, with_keys ? "yes" : "no", point_ms, rows / wall_s, batches / wall_s,
       static_cast<double>(after.messages - before.messages) / wall_s, 100.0 * loop_cpu_s / wall_s,
-      100.0 * (server_cpu_s - loop_cpu_s) / wall_s, 100.0 * crowd_cpu_s / wall_s,
+      100.0 * (server_cpu_s - loop_cpu_s) / wall_s, 100.0 * generator_cpu_s / wall_s,
       1e6 * server_cpu_s / rows, seen.quantile_ms(0.5), seen.quantile_ms(0.99),
       seen.quantile_ms(1.0), seen.latencies_ms.size() + seen.unanswered, at_rest.resident_MB,
       left.peak_MB, left.resident_MB, static_cast<unsigned long long>(after.connects - workers));
   std::fflush(stdout);
   if (after.connects > workers) {
-    std::fprintf(stderr, "longest delay of the crowd's own thread: %.1f s\n", after.longest_gap_s);
+    std::fprintf(stderr, "longest delay of the load generator's thread: %.1f s\n",
+                 after.longest_gap_s);
   }
 }
 
@@ -166,8 +168,8 @@ void run(const Flags& flags) {
   std::printf(
       "| workers | keys | point [ms] | results/s | batches/s | their messages/s | CPU: loop | "
       "writer | "
-      "crowd | us a "
-      "result | status p50 [ms] | p99 | max | asked | server MB: at rest | peak | after | "
+      "generator | us per "
+      "result | status p50 [ms] | p99 | max | requests | server MB: at rest | peak | after | "
       "reconnects |\n"
       "|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|"
       "\n");
@@ -187,7 +189,7 @@ void run(const Flags& flags) {
 
 int main(int argc, char** argv) {
   oblique::bench::Flags flags;
-  CLI::App app{"Measures one server with many workers that solve nothing.", "oblique-crowd-bench"};
+  CLI::App app{"Measures one server with many workers that solve nothing.", "oblique-load-bench"};
   app.add_option("--workers", flags.workers, "Numbers of workers; one row for each")
       ->delimiter(',')
       ->capture_default_str();
@@ -205,7 +207,7 @@ int main(int argc, char** argv) {
   try {
     oblique::bench::run(flags);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "oblique-crowd-bench: %s\n", error.what());
+    std::fprintf(stderr, "oblique-load-bench: %s\n", error.what());
     return EXIT_FAILURE;
   }
   return EXIT_SUCCESS;

@@ -7,12 +7,12 @@
 namespace oblique::client {
 
 /// Returns an invented largest drop: 0.98263 of the finger's length, about as in the paper.
-inline double pretended_drop_m(const solver::ModelParameters& model) {
+inline double fake_drop_m(const solver::ModelParameters& model) {
   return 0.98263 * std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
 }
 
-inline ReachCheck pretended_reach() {
-  return ReachChecker(pretended_drop_m);
+inline ReachCheck fake_reach() {
+  return ReachChecker(fake_drop_m);
 }
 
 }  // namespace oblique::client

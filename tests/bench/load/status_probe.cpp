@@ -1,4 +1,4 @@
-#include "tests/bench/crowd/status_probe.h"
+#include "tests/bench/load/status_probe.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,12 +57,12 @@ void StatusProbe::run() {
   protocol::ClientRequest request;
   request.set_protocol_version(protocol::kProtocolVersion);
   request.mutable_status()->set_study(study_);
-  std::map<std::uint64_t, Clock::time_point> asked;  // send time of each open request
+  std::map<std::uint64_t, Clock::time_point> open_requests;  // send time of each open request
   Clock::time_point next = Clock::now();
-  while (!stopping_ || (!asked.empty() && Clock::now() < next + std::chrono::seconds(1))) {
+  while (!stopping_ || (!open_requests.empty() && Clock::now() < next + std::chrono::seconds(1))) {
     if (!stopping_ && Clock::now() >= next) {
       request.set_request_id(request.request_id() + 1);
-      asked[request.request_id()] = Clock::now();
+      open_requests[request.request_id()] = Clock::now();
       socket.send(zmq::buffer(protocol::encode(request)), zmq::send_flags::none);
       next += interval_;
     }
@@ -74,13 +74,13 @@ void StatusProbe::run() {
     while (socket.recv(frame, zmq::recv_flags::dontwait)) {
       protocol::ClientReply reply;
       const bool is_reply = protocol::decode({frame.data<char>(), frame.size()}, reply);
-      const auto found = asked.find(reply.request_id());
-      if (!is_reply || found == asked.end()) {
+      const auto found = open_requests.find(reply.request_id());
+      if (!is_reply || found == open_requests.end()) {
         continue;
       }
       const std::chrono::duration<double, std::milli> latency = Clock::now() - found->second;
       seen_.latencies_ms.push_back(latency.count());
-      asked.erase(found);
+      open_requests.erase(found);
       if (reply.has_status() && reply.status().studies_size() == 1) {
         const auto& study = reply.status().studies(0);
         seen_.settled = study.solved() + study.failed();
@@ -89,7 +89,7 @@ void StatusProbe::run() {
       }
     }
   }
-  seen_.unanswered = asked.size();
+  seen_.unanswered = open_requests.size();
 }
 
 }  // namespace oblique::bench

@@ -1,4 +1,4 @@
-#include "tests/bench/crowd/crowd.h"
+#include "tests/bench/load/load_generator.h"
 
 #include <sys/epoll.h>
 
@@ -30,7 +30,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 /// Number of results in one message of a real worker.
-constexpr std::uint64_t kResultsATurn = 1000;
+constexpr std::uint64_t kResultsPerTurn = 1000;
 /// Interval at which real workers report while they solve a batch.
 constexpr double kReportInterval_s = 0.1;
 
@@ -54,9 +54,9 @@ protocol::WorkerHello hello_of(std::size_t number) {
   protocol::set_protocol(hello);
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
-  hello.set_name("crowd:" + std::to_string(number));
+  hello.set_name("load:" + std::to_string(number));
   hello.set_threads(1);
-  hello.set_process_id("crowd " + std::to_string(number));
+  hello.set_process_id("load " + std::to_string(number));
   return hello;
 }
 
@@ -66,9 +66,9 @@ protocol::PointResult solved_result() {
 
 }  // namespace
 
-class Crowd::Parts {
+class LoadGenerator::Parts {
  public:
-  explicit Parts(const CrowdSettings& settings)
+  explicit Parts(const LoadSettings& settings)
       : settings_(settings), result_(solved_result()), epoll_(epoll_create1(EPOLL_CLOEXEC)) {
     context_.set(zmq::ctxopt::max_sockets, 4 * static_cast<int>(settings.workers) + 64);
     for (std::size_t number = 0; number < settings.workers; ++number) {
@@ -83,7 +83,7 @@ class Crowd::Parts {
   Parts(const Parts&) = delete;
   Parts& operator=(const Parts&) = delete;
 
-  CrowdCounts counts() const { return {batches_, results_, messages_, connects_, welcomed_}; }
+  LoadCounts counts() const { return {batches_, results_, messages_, connects_, welcomed_}; }
 
  private:
   struct Job {
@@ -169,11 +169,11 @@ class Crowd::Parts {
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
     // One message at a time, so that other workers get their turn.
-    std::uint64_t solved = std::min<std::uint64_t>(left, kResultsATurn);
+    std::uint64_t solved = std::min<std::uint64_t>(left, kResultsPerTurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {
       solved = std::min(solved, static_cast<std::uint64_t>(elapsed_s / settings_.point_s));
-      if (solved < std::min(left, kResultsATurn) &&
+      if (solved < std::min(left, kResultsPerTurn) &&
           (elapsed_s < kReportInterval_s || solved == 0)) {
         return false;
       }
@@ -257,7 +257,7 @@ class Crowd::Parts {
     }
   }
 
-  CrowdSettings settings_;
+  LoadSettings settings_;
   protocol::PointResult result_;
   zmq::context_t context_;
   protocol::Descriptor epoll_;
@@ -276,10 +276,11 @@ std::size_t bytes_of_result() {
   return solved_result().ByteSizeLong();
 }
 
-Crowd::Crowd(const CrowdSettings& settings) : parts_(std::make_unique<Parts>(settings)) {}
-Crowd::~Crowd() = default;
+LoadGenerator::LoadGenerator(const LoadSettings& settings)
+    : parts_(std::make_unique<Parts>(settings)) {}
+LoadGenerator::~LoadGenerator() = default;
 
-CrowdCounts Crowd::counts() const {
+LoadCounts LoadGenerator::counts() const {
   return parts_->counts();
 }
 
