@@ -40,7 +40,7 @@ Opened& opened() {
   return files;
 }
 
-/// Whether the command line accepts `condition`.
+/// Returns whether the command line accepts `condition`.
 bool is_taken(const std::string& condition) {
   try {
     oblique::server::check_sql_part("--where", condition);

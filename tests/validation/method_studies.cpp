@@ -257,7 +257,7 @@ struct StepCase {
   solver::ModelParameters model;
   std::size_t points = 300;
   double least_e =
-      solver::StepChoice::kFastRestitution;  ///< smallest e*; smaller values need shorter steps
+      solver::StepChoice::kFastRestitution;  ///< smallest e*; below it, shorter steps are needed
   double largest_e = 1.0;
   std::vector<double> factors{1.0};  ///< factors that multiply the chosen steps
 };
@@ -271,7 +271,7 @@ struct StepErrors {
   double duration = 0.0;   ///< relative
   double slide = 0.0;      ///< relative
   double stick_s = 0.0;
-  double exit_m_s = 0.0;         ///< larger of the errors of both components
+  double exit_m_s = 0.0;         ///< larger error of both components of the exit velocity
   std::int64_t late_sticks = 0;  ///< points whose stick has an error above 5 ns
   std::int64_t grazing = 0;      ///< points left out because their mode depends on the step
 };

@@ -159,7 +159,7 @@ solver::ModelParameters soft_chain() {
   return model;
 }
 constexpr double kFall_s = 0.2;
-/// This time is before the end of the shortest of the ten contacts.
+/// A time before the end of the shortest of the ten contacts.
 constexpr double kContact_s = 330e-6;
 
 TEST(Order, OfTheExplicitIntegratorIsFourInTheFall) {

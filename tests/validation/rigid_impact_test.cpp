@@ -141,7 +141,8 @@ struct StiffLinks {
   solver::ChainState state(const solver::Chain& chain, const Eigen::Vector2d& V_m_s) const {
     const Eigen::Vector2d rate = J.inverse() * V_m_s;
     solver::ChainState state = chain.at_rest();
-    // Rows of q: pin, slope; inner link's end slope, joint, outer link's first slope; tip, slope.
+    // Rows of q: pin and its slope; slope of the inner link at the joint, joint, slope of the outer
+    // link at the joint; tip and its slope.
     const Eigen::Index link_of[7] = {0, 0, 0, 0, 1, 1, 1};
     const bool is_slope[7] = {false, true, true, false, true, false, true};
     const Eigen::Vector2d joint_m = J.col(0).reverse().cwiseProduct(Eigen::Vector2d(1.0, -1.0));

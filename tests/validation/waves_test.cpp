@@ -47,8 +47,8 @@ ChainState turning(const Chain& chain, double length_m) {
   return state;
 }
 
-/// Returns a link that hangs straight down. All nodes except the pinned one move down at V0. A wave
-/// starts at the pin with the speed of sound.
+/// Returns a link that hangs straight down. All nodes except the pin move down at V0. A wave starts
+/// at the pin with the speed of sound.
 ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   ChainState state = chain.at_rest();
   state.q.row(1) = -state.q.row(0);

@@ -36,7 +36,7 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
   return {1, 7, ranges, points};
 }
 
-/// Holds each point in the solver until the test lets it end.
+/// Makes each point wait in the solver until the test lets it end.
 class Gate {
  public:
   /// Called by the solver for each point. Counts the point as begun and waits until it may end.
@@ -276,7 +276,7 @@ TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolve
       [&](const Batch& at_hand, auto& points, const auto& take) {
         if (at_hand.number() == 1 && ++taken_up > 2) {
           ADD_FAILURE() << "a dropped batch was started";
-          std::abort();  // otherwise the test would never end
+          std::abort();  // a failure alone would not end this test
         }
         fail_all(points, take, [&] {
           if (at_hand.number() == 1) {

@@ -91,7 +91,7 @@ TEST_F(ConversationTest, AfterSilenceTheWorkerReconnectsAndAnyMessageEndsTheSile
 
 TEST_F(ConversationTest, AnUnansweredHelloIsRepeatedAfterAPauseThatDoublesToTwoSeconds) {
   start();
-  std::int64_t patience_ms = 3000;  // doubles up to 12 s, for slow networks
+  std::int64_t patience_ms = 3000;  // timeout that doubles up to 12 s, for slow networks
   for (const std::int64_t backoff_ms : {50, 100, 200, 400, 800, 1600, 2000, 2000}) {
     pass(patience_ms - 1);
     EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + 1);

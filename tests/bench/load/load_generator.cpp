@@ -168,7 +168,7 @@ class LoadGenerator::Parts {
     }
     Job& job = member.jobs.front();
     const std::uint64_t left = job.batch.size() - job.done;
-    // One message at a time, so that other workers get their turn.
+    // Sends at most one message, so that other workers get their turn.
     std::uint64_t solved = std::min<std::uint64_t>(left, kResultsPerTurn);
     const double elapsed_s = now_s() - member.solving_since_s;
     if (settings_.point_s > 0.0) {
@@ -269,7 +269,7 @@ class LoadGenerator::Parts {
   std::atomic<std::uint64_t> welcomed_ = 0;
   std::atomic<double> longest_gap_s_ = 0.0;
   std::atomic<bool> stopping_ = false;
-  std::thread thread_;  // declared last: it uses the other members
+  std::thread thread_;  // declared last, because it uses the other members
 };
 
 std::size_t bytes_of_result() {

@@ -19,7 +19,7 @@ class StatusProbe {
   struct Seen {
     std::vector<double> latencies_ms;  ///< ascending
     std::uint64_t unanswered = 0;      ///< requests
-    std::uint64_t settled = 0;         ///< solved and failed points in the last reply
+    std::uint64_t settled = 0;         ///< number of solved and failed points in the last reply
     std::uint64_t leased = 0;
     std::uint32_t workers = 0;
 

@@ -136,7 +136,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
 TEST(StopSignals, TheDestructorRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
-    raise(SIGTERM);  // ends this process below if it is still pending there
+    raise(SIGTERM);  // if it stayed pending, it would end this process below
   }
   sigset_t blocked;
   ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);

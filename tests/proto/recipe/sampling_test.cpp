@@ -27,8 +27,8 @@ using protocol::SAMPLE_SOBOL;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Returns a digest of the coordinates of points in all dimensions. Each coordinate times 2^64 is
-/// eight bytes, least significant byte first.
+/// Returns a digest of the coordinates of points in all dimensions. Before hashing, each coordinate
+/// is multiplied by 2^64 and written as eight bytes, least significant byte first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   std::string bytes;
   for (std::uint64_t index = first; index < first + count; ++index) {
@@ -133,8 +133,8 @@ Quantiles normal(double mean, double sd, double from, double to) {
   return of_kind(protocol::DISTRIBUTION_NORMAL, from, to, mean, sd);
 }
 
-/// Approximates the expected value of `of` by the mean over kParts quantiles at equal distances of
-/// probability.
+/// Approximates the expected value of `of` by its mean over kParts quantiles with equally spaced
+/// probabilities.
 double mean_of(const Quantiles& distribution, const std::function<double(double)>& of) {
   constexpr int kParts = 100'000;
   double sum = 0.0;

@@ -407,7 +407,7 @@ TEST_F(OfflineStudyTest, TheStoredRecipeCanBeReadWhileAServerWorks) {
 TEST_F(OfflineStudyTest, ATooLongRecipeIsNotParsed) {
   close();
   const std::string block =
-      study_.table->recipe().SerializeAsString();  // still valid when repeated
+      study_.table->recipe().SerializeAsString();  // repeated, it is still a valid recipe
   std::string bytes;
   while (bytes.size() <= protocol::kMaxFrameBytes) {
     bytes += block;

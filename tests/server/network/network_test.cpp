@@ -506,7 +506,8 @@ TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndN
   peers[0]->say_hello();
   take_welcome(*peers[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  const auto silent = keyed_peers(1, kElsewhere);  // fills the place that `second` has left
+  // This peer gets the place that became free when `second` was admitted.
+  const auto silent = keyed_peers(1, kElsewhere);
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(peers[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";
 }

@@ -106,7 +106,7 @@ struct Link {
   }
   std::string hello_frame() { return command_frame("HELLO", client.hello()); }
   std::string initiate_frame() { return command_frame("INITIATE", client.initiate()); }
-  /// Expects that the server refuses these bytes with `answer`, which may be empty.
+  /// Expects that the server refuses these bytes and sends `answer`, which may be empty.
   void expect_refused(std::string_view bytes, const std::string& answer = error_frame("500")) {
     EXPECT_EQ(send(bytes), answer);
     EXPECT_THAT(zmtp.fault(), Not(IsEmpty()));
@@ -433,8 +433,7 @@ TEST_F(CurveTest, MessagesOfTheServerHaveCountersThatGrow) {
     std::string_view body = "reply";
     const std::string frame = link.zmtp.begin_message(body);
     EXPECT_THAT(body, IsEmpty());
-    // libzmq treats an outer flag "more" as the encrypted flag "more". So the outer flags must be
-    // 0.
+    // libzmq reads an outer flag "more" as the encrypted flag "more". So the outer flags must be 0.
     EXPECT_EQ(frame[0], 0);
     EXPECT_EQ(link.client.opened_message(frame.substr(2)), std::string("\0reply", 6));
     EXPECT_EQ(number_of(std::string_view(frame).substr(10, 8)), counter);

@@ -18,7 +18,8 @@ namespace {
 
 using Comments = std::map<std::string, std::string>;
 
-/// Returns the comments of columns in CREATE TABLE: on the column's line or on the lines before it.
+/// Returns the comments of columns in CREATE TABLE. A comment is on the line of its column or on
+/// the lines before it.
 Comments comments_of(const std::string& create) {
   static const std::regex kLine("[ \n]*(\\w*)[^\n]*?(?:-- ([^\n]*))?(?:\n|$)");
   Comments comments;

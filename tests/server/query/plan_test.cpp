@@ -142,7 +142,7 @@ TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
   EXPECT_EQ(columns.back().name, "phases[0].t1_s");
 }
 
-/// Returns the axes among the columns that a query shows by default.
+/// Returns the axes among the columns that a study query selects by default.
 std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
   auto columns = usual_columns(recipe);
   columns.erase(std::find(columns.begin(), columns.end(), "status"), columns.end());

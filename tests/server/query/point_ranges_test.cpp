@@ -1,4 +1,4 @@
-// Tests the ranges of points that conditions give, and compares whole plans with plain SQLite.
+// Tests the ranges of points that conditions select. Compares whole plans with plain SQLite.
 #include "server/query/plan.h"
 
 #include <algorithm>

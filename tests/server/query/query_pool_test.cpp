@@ -64,7 +64,7 @@ class QueryPoolTest : public testing::Test {
   }
   void advance_ms(std::int64_t time_ms) {
     now_ms_ += time_ms;
-    // No query has this number; the call only makes the pool check its clock.
+    // No query has this number. The call only makes the pool read its clock.
     pool().cancel(UINT64_MAX);
   }
   std::uint64_t submit(const std::string& sql, const std::string& client = "") {

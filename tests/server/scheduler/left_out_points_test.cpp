@@ -1,4 +1,4 @@
-// Tests of left-out points, which workers report and the server completes without a row.
+// Tests of left-out points. Workers report them, and the server completes them without a row.
 #include <memory>
 #include <string>
 #include <vector>

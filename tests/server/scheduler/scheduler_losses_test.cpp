@@ -1,4 +1,4 @@
-// Tests of lost workers: they must not cause the failure of harmless points.
+// Tests that the loss of workers does not make harmless points fail.
 #include <algorithm>
 #include <cstdint>
 #include <deque>
@@ -242,8 +242,8 @@ TEST(WorkerProcesses, TheLatestAbsentProcessesAreKept) {
 
 // ---- Points that kill workers ----
 
-/// Simulates a supervisor that starts a new worker process whenever one dies. Each worker dies of
-/// any batch that contains a harmful point.
+/// Simulates a supervisor that starts a new worker process whenever a process dies. A worker dies
+/// when it solves a batch that contains a harmful point.
 class Supervised {
  public:
   Supervised(SchedulerBench& bench, std::set<std::uint64_t> killers, std::uint32_t prefetch,
@@ -332,8 +332,8 @@ TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
     const std::set<std::uint64_t> killers{137, 777};
     Supervised supervised(bench, killers, 3, points.get());
     supervised.run();
-    // Each harmful point kills at most nine workers: two until the point is suspect, four while its
-    // 1000 points are divided by eight, and three when the point is alone.
+    // Each harmful point kills at most nine workers: two until it is suspect, four while the
+    // scheduler divides 1000 points by eight, and three when the point is alone.
     EXPECT_LE(supervised.deaths, 2 * (2 + 4 + 3));
     ASSERT_EQ(supervised.failed.size(), 2U);
     EXPECT_TRUE(supervised.failed.contains(137) && supervised.failed.contains(777));

@@ -1,4 +1,4 @@
-// Tests of slow workers: other workers get their points, and nothing counts as lost.
+// Tests of slow workers: other workers get their points, but no worker counts as lost.
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -288,7 +288,7 @@ TEST_F(StragglerTest, AHarmfulBatchIsFoundAlthoughTwoWorkersHeldIt) {
   EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty())
       << "the batch was sent to a third worker";
   const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
-  // Two workers are lost, so the points are suspect and need a proven worker.
+  // Two workers are lost. So the points are suspect, and only a proven worker may get them.
   ASSERT_EQ(probe.size(), 1U);
   EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U)
       << "suspect points are sent one by one";

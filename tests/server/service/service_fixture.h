@@ -23,7 +23,8 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// Records everything that the service sends. The test decides how writes, queries and checks end.
+/// Records everything that the service sends. The tests choose the outcomes of writes, queries and
+/// checks.
 class FakePorts final : public Ports {
  public:
   Delivery to_worker(const std::string& identity, const std::string& frame) override {
@@ -239,7 +240,7 @@ class ServiceTest : public testing::Test {
     }
     service_->scheduler().check_invariants();
   }
-  /// Ends the `index`-th query with this reply.
+  /// Ends the `index`-th query with the given reply.
   void answer_query(std::size_t index, const std::string& reply) {
     service_->query_report({QueryReport::Kind::kAnswered, ports_.queries.at(index).ticket, reply});
   }

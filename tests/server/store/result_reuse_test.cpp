@@ -157,7 +157,7 @@ TEST_F(ResultReuseTest, AModelWithoutRowsCostsOneProbe) {
 
 // ---- Random studies, compared with a lookup in a map --------------------------------------------
 
-/// Returns a block with few values per key, so that many points occur several times.
+/// Returns a block with few values per axis, so that many points occur several times.
 protocol::Block random_block(std::mt19937& random) {
   const auto pick = [&](const std::string& key, std::vector<double> values) {
     std::shuffle(values.begin(), values.end(), random);

@@ -371,7 +371,7 @@ TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
 
 // ---- Tables, views and triggers -----------------------------------------------------------------
 
-/// Provides a database with three solved points. The tests change it like another program.
+/// Provides a database with three solved points. The tests change it as another program would.
 class SchemaTest : public StoreFixture {
  protected:
   SchemaTest() {

@@ -450,7 +450,7 @@ TEST(RequestRules, RefuseRequestsOfOtherSites) {
       {"POST", "/", {kOrigin}, 403},
       {"GET", "/", {kHost, kOrigin}, 200},
       {"GET", "/", {kHost, same}, 200},
-      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // address typed by the user
+      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // the user typed the address
   });
   for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
                                   "http://localhost", "http://localhost:7603", ""}) {

@@ -1,4 +1,4 @@
-// Tests of access to the page and of its requests, except for pictures, with a whole server.
+// Tests of access to the page, and of its requests except for pictures, with a whole server.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>

@@ -1,4 +1,4 @@
-// Measures how accurate estimated errors are. Solves random points with estimates, and again on a
+// Measures how accurate estimated errors are. Solves random points with estimates, and then on a
 // mesh so fine that its results count as exact.
 #include <algorithm>
 #include <array>
@@ -208,7 +208,7 @@ void check(const Settings& settings) {
   const auto points = random_points(settings);
   ModelParameters finest = model_of(settings, settings.truth);
   finest.step_factor = 0.5;
-  finest.integrator = solver::Integrator::kExplicit;  // much faster and equally accurate
+  finest.integrator = solver::Integrator::kExplicit;  // faster, and equally accurate
   const Results truth = solve(finest, points);
   for (const int mesh : settings.meshes) {
     check_mesh(model_of(settings, mesh), points, truth);

@@ -163,7 +163,8 @@ TEST(EstimatedErrors, TwiceTheEstimateBoundsTheDifferenceToAFinerMesh) {
 
 using Outcomes = std::map<std::uint64_t, Outcome>;
 
-/// Returns outcomes by point number. Expects that each point is requested and answered once.
+/// Returns the outcomes by point number. Expects that each point is requested and answered exactly
+/// once.
 Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& falls) {
   Outcomes outcomes;
   std::size_t next = 0;

@@ -70,7 +70,7 @@ class RigidImpact {
   enum class End { kSeparation, kTurn, kSlip, kStick };
   struct Ending {
     End end;
-    double t_s;  ///< since the start of the regime
+    double t_s;  ///< time from the start of the regime
     double s;    ///< direction in which P slides after kSlip
   };
 

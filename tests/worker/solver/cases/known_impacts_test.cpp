@@ -12,7 +12,7 @@
 namespace oblique::solver {
 namespace {
 
-/// Relative error that the default step may cause, in addition to the rounding of the known value.
+/// Relative error allowed for the default step, in addition to the rounding of the known value.
 constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
 constexpr double kTimeDigit_us = 0.0005;

@@ -39,8 +39,8 @@ TEST(Impact, WithoutHysteresisRestitutionLosesNoEnergy) {
 }
 
 TEST(Impact, TheLossInRestitutionIsTheSumOverAllCyclesBetweenTurns) {
-  // Compression from F_a to F_b along the slope k takes (F_b^2 - F_a^2)/2k. Restitution along the
-  // slope k/e*^2 returns e*^2 times that energy.
+  // Compression from F_a to F_b on a line of slope k takes the energy (F_b^2 - F_a^2)/2k.
+  // Restitution on a line of slope k/e*^2 returns e*^2 times that energy.
   const double e_star = 0.7;
   const CaseResult result = paper_finger().solve(1.0, 0.4, e_star);
   ASSERT_EQ(result.peaks.size(), 3U);

@@ -47,7 +47,7 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
     EXPECT_EQ(first.state[1], 'C');
     const TraceRow& last = t.rows.back();
     EXPECT_EQ(last.t_s, t.result.duration_s);
-    // The tolerance is the change of the restitution spring's force in 1e-13 s.
+    // The tolerance is the amount by which the force of the restitution spring changes in 1e-13 s.
     const double fn_N = kLocated_s * coarse_finger().model().k_N_m * std::abs(last.vn_m_s) /
                         (t.result.e_star * t.result.e_star);
     EXPECT_NEAR(last.fn_N, 0.0, fn_N);

@@ -71,7 +71,7 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
     models[4].k_N_m *= 0.7;  // its chain equals that of the first model
     std::vector<std::unique_ptr<Coarse>> list;
     for (const ModelParameters& model : models) {
-      list.emplace_back(new Coarse{model});  // not movable: members point to each other
+      list.emplace_back(new Coarse{model});  // not movable, because members point to each other
     }
     return list;
   }();

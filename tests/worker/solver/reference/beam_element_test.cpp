@@ -49,7 +49,8 @@ Nodes energy_gradient(const Nodes& q) {
   return elastic_gradient(q.transpose(), constants()).transpose();
 }
 
-/// Returns the derivative at 0 from five points, exact up to degree 4, the degree of the energy.
+/// Returns the derivative at 0 from five points. It is exact up to degree 4, the degree of the
+/// energy.
 template <class Function>
 std::invoke_result_t<Function, double> five_point_difference(const Function& f, double h) {
   return ((f(-2.0 * h) - f(2.0 * h)) + 8.0 * (f(h) - f(-h))) / (12.0 * h);

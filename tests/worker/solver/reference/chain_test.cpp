@@ -96,11 +96,11 @@ TEST(Chain, JointsRotateFreely) {
   model.elements_per_link = 1;
   const Chain chain(model);
   Coordinates q = chain.at_rest().q;
-  // The rows are: pin, slope, slope at the joint, joint, slope after the joint, tip, slope.
+  // The rows are: pin, slope, slope before the joint, joint, slope after the joint, tip, slope.
   ASSERT_EQ(chain.rows(), 7);
   q.rightCols<3>() << 0.0, 0.4, 0.0, 1.0, 0.4, 1.0;
   EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-  // Rotating the slope before the joint bends the inner link, which stores energy.
+  // A rotated slope before the joint bends the inner link. This stores energy.
   q.col(2) << 0.0, 1.0;
   EXPECT_GT(chain.strain_energy_J(q), 1.0);
 }

@@ -122,7 +122,8 @@ TEST(ContactRecord, ExchangedWorkIsTheSumOfAbsoluteValuesInBothDirections) {
   integrals.work_t = -0.375;
   contact.step_to(at(0.0, 0.0), integrals);
   const CaseResult result = contact.finished(2e-4);
-  // F_n of 1e6 N/m * 1e-3 m exchanges half a joule in each direction. The tangential work is added.
+  // A normal force of up to 1e6 N/m * 1e-3 m exchanges half a joule in compression and half a joule
+  // in restitution. The tangential work is added.
   EXPECT_DOUBLE_EQ(result.energy.exchanged_J, 0.5 + 0.5 + 0.25 + 0.375);
   EXPECT_DOUBLE_EQ(result.energy.friction_J, 0.125);
   EXPECT_NEAR(result.energy.restitution_J, 0.0, 1e-15);
@@ -190,7 +191,7 @@ TEST(WithoutRipples, RemainingExtremaAlternateStartAndEndWithAPeakAndContainTheL
 
 constexpr double k_N_m = 1e6;
 constexpr double kEta2 = 1.25;
-constexpr double kStep_s = 0.97e-6;  // no event is at the end of a step
+constexpr double kStep_s = 0.97e-6;  // chosen so that no event is at the end of a step
 
 /// Returns the tip's state during half a period, in which V_n goes from -1 to 1 m/s.
 TipState half_period(double t_s, double vt_m_s) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-/// Tests the contact of a tip that moves along a given path, whatever the forces.
+/// Tests the contact of a tip that moves along a given path, regardless of the forces.
 namespace oblique::solver {
 namespace {
 
@@ -77,7 +77,7 @@ TipPath in_step(double lead_s, double skew = 0.0) {
 }
 
 TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
-  // Events less than 1e-12 s apart count as simultaneous, whichever comes first.
+  // Events less than 1e-12 s apart count as simultaneous, in either order.
   for (const double lead_s : {0.0, 4e-13, -4e-13}) {
     SCOPED_TRACE(lead_s);
     const TipPath path = in_step(lead_s);
@@ -95,8 +95,9 @@ TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
 }
 
 TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
-  // In the first step that contains both events, the polynomials place the extremum of F_t before
-  // the turn. So the extremum is located first, and the turn is found only at the common instant.
+  // In the first step that contains both events, the polynomials have the extremum of F_t before
+  // the turn (the end of compression). So the extremum is located first, and the turn is found only
+  // at the common instant.
   struct Step {
     double skew;
     double h_s;
@@ -146,7 +147,7 @@ TEST(Contact, ASlipThatRoundingPutsJustBeforeSeparationIsNotInTheMode) {
 }
 
 TEST(Contact, ARegimeOfZeroDurationIsNotInTheMode) {
-  // Both velocities reach zero together. The turn comes first, then stick begins.
+  // V_t and V_n reach zero together. The end of compression comes first, then stick begins.
   const TipPath path = [](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
     const double z = kRate * t_s;

@@ -154,7 +154,7 @@ TEST(GeneralizedAlpha, AStepForWhichNewtonFailsIsASolveErrorWithItsTime) {
 }
 
 TEST(GeneralizedAlpha, StepsOfChangingLengthKeepTheOrder) {
-  // Steps change their length around events. Half the length must give a quarter of the error.
+  // Steps change their length around events. Half the step must give a quarter of the error.
   const auto error = [](int divisions) {
     MovingChain moving(coarse_model());
     const auto force = push_at(moving.chain.tip(moving.state));
