@@ -10,7 +10,7 @@
 namespace oblique::bench {
 namespace {
 
-/// Returns the user and system time [s] in a `stat` file of /proc.
+/// Returns the CPU time [s], user plus system, in a `stat` file of /proc; 0 without a file.
 double cpu_s_of(const std::string& file) {
   std::ifstream stat(file);
   const std::string text((std::istreambuf_iterator<char>(stat)), std::istreambuf_iterator<char>());

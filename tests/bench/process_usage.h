@@ -4,7 +4,7 @@
 
 namespace oblique::bench {
 
-/// Resources that a running process has used so far; zeros if the process has ended.
+/// Resources that a running process has used so far. All are zero if the process has ended.
 struct Usage {
   double cpu_s = 0.0;               ///< time of all threads
   double first_thread_cpu_s = 0.0;  ///< time of the main thread

@@ -169,8 +169,8 @@ struct Underway : Study {
   double count() const { return database.rows(); }
 };
 
-/// Measures the time from killing a worker until another worker has solved all points of the killed
-/// one. These points have attempt 2.
+/// Measures the time from killing a worker until another worker has solved all points that the
+/// killed worker held. These points have attempt 2.
 void bench_worker_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker survivor(study.folder, study.server.worker_url());
@@ -188,7 +188,8 @@ void bench_worker_killed(std::uint64_t points) {
               solved_s - std::chrono::duration<double>(killed).count());
 }
 
-/// Measures the time from killing and restarting the server until both workers' results are stored.
+/// Kills and restarts the server. Measures the time from the kill until results of both workers are
+/// stored.
 void bench_server_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker one(study.folder, study.server.worker_url());

@@ -64,7 +64,7 @@ void solve_scalar(const Chain& chain, const solver::Fall& fall, const solver::St
                             steps.contact(point.e_star), fall.state_at(point.H_m), {}));
 }
 
-/// Builds the model and solves the fall for every point, without lanes, as a simple script would.
+/// Solves every point as a simple script would: with its own model and fall, without vector lanes.
 void naive(benchmark::State& bench) {
   const std::vector<Point> points = sweep();
   std::size_t next = 0;
@@ -74,13 +74,13 @@ void naive(benchmark::State& bench) {
     const solver::StepChoice steps(chain, model);
     const auto fall = solver::solve_stepped_fall(chain, steps.fall_s());
     solve_scalar(chain, *fall, steps, points[next]);
-    next = (next + 37) % points.size();  // spreads the points over the grid
+    next = (next + 37) % points.size();  // a stride that scatters successive points over the grid
   }
   count_cases(bench, 1);
 }
 BENCHMARK(naive)->Unit(benchmark::kMillisecond);
 
-/// Solves all points after one fall, without vector lanes.
+/// Solves one fall, and then the contacts of all points without vector lanes.
 void shared_fall(benchmark::State& bench) {
   const ModelParameters model = with_elements(bench.range(0));
   const Chain chain(model);
@@ -96,7 +96,8 @@ void shared_fall(benchmark::State& bench) {
 }
 BENCHMARK(shared_fall)->Arg(4)->Arg(16)->Unit(benchmark::kMicrosecond);
 
-/// Solves all points after one fall on vector lanes. The second argument is the number of threads.
+/// Solves one fall, and then the contacts of all points on vector lanes. The second argument is the
+/// number of threads.
 void lanes_and_threads(benchmark::State& bench) {
   const Finger finger(with_elements(bench.range(0)));
   const auto threads = static_cast<std::size_t>(bench.range(1));
@@ -128,7 +129,7 @@ BENCHMARK(lanes_and_threads)
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
-/// Solves the points `point_at(0)`, `point_at(1)`, and so on, as a thread of a worker does.
+/// Solves `count` points, given by `point_at`, as a thread of a worker does.
 void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>& point_at) {
   std::size_t next = 0;
   solver::solve_points(
@@ -143,7 +144,7 @@ void solve_all(std::size_t count, const std::function<FingerPoint(std::size_t)>&
       });
 }
 
-/// Every point has its own k and eta2. All points share one fall; they have one drop or 8 drops.
+/// Points that differ in k and eta2 but share one fall. They have 1 or 8 different drops H.
 void distinct_contacts(benchmark::State& bench) {
   const ModelParameters model = solver::preset("paper");
   const auto fallen = solver::solve_falls({&model, 1}).front().fallen;
@@ -163,7 +164,8 @@ void distinct_contacts(benchmark::State& bench) {
 }
 BENCHMARK(distinct_contacts)->ArgName("drops")->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond);
 
-/// Every point has its own E, I and lengths, and so its own fall. Twice as many points as lanes.
+/// Points that differ in E, I and lengths, so that each needs its own fall. There are twice as many
+/// points as vector lanes.
 void distinct_chains(benchmark::State& bench) {
   const std::size_t cases = 2 * solver::runnable_lane_kernels().front().lanes;
   int round = 0;

@@ -19,8 +19,8 @@ bool is_same(double a, double b) {
 
 using Names = std::vector<std::string>;
 
-/// Returns the value of an expression in which each name has the value 0.75; nothing if the
-/// expression is wrong. Appends its names to `names` in the order of the text.
+/// Returns the value of an expression in which each name has the value 0.75, or nothing if the
+/// expression is invalid. Appends the names to `names` in their order in the text.
 std::optional<double> value_of(const std::string& text, Names& names) {
   try {
     const Expression expression(text, [&](std::string_view name) {
@@ -35,8 +35,8 @@ std::optional<double> value_of(const std::string& text, Names& names) {
 
 }  // namespace
 
-/// Checks that an expression or filter either has a value or causes an InputError. In brackets it
-/// must have the same names and value, unless the brackets make it too long or too deep.
+/// Checks that an expression or filter has a value or causes an InputError. In brackets the same
+/// text must have the same names and value, unless the brackets exceed a limit of length or depth.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string text(reinterpret_cast<const char*>(data), size);
   Names names;

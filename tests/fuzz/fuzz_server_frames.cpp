@@ -28,7 +28,8 @@ class Sink final : public Ports {
   std::vector<WriteJob> jobs;
 };
 
-/// Uses the input as messages to a service: the first byte of each piece selects sender and length.
+/// Splits the input into messages to a service. The first byte of each message selects its sender
+/// and length.
 void converse(std::string_view input) {
   Sink ports;
   ServiceSettings settings;

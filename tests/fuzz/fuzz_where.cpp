@@ -40,7 +40,7 @@ Opened& opened() {
   return files;
 }
 
-/// Whether the command line accepts `condition`.
+/// Returns whether the command line accepts `condition`.
 bool is_taken(const std::string& condition) {
   try {
     oblique::server::check_sql_part("--where", condition);
@@ -50,7 +50,8 @@ bool is_taken(const std::string& condition) {
   }
 }
 
-/// Checks that an accepted condition has no effect outside its brackets: there must be no row.
+/// Checks that an accepted condition cannot break out of its brackets: `(condition) AND 0` must
+/// select no row.
 void expect_no_row(oblique::server::Reader& database, const std::string& condition) {
   const auto reply =
       database.query("SELECT 1 FROM (SELECT 1 AS point, 0.4 AS mu, 0.9 AS e) WHERE (" + condition +
@@ -61,8 +62,8 @@ void expect_no_row(oblique::server::Reader& database, const std::string& conditi
   }
 }
 
-/// Uses the text as one part of a query; the length of the text selects the part. The query must
-/// give a plan or an InputError.
+/// Uses the text as one part of a query. The length of the text selects the part. Planning the
+/// query must succeed or throw an InputError.
 void plan_query(sqlite3* database, const std::string& text) {
   constexpr std::size_t kParts = 4;
   oblique::protocol::StudyQuery question;

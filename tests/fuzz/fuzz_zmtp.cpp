@@ -15,7 +15,8 @@ void send_pieces(Zmtp& zmtp, std::string_view input) {
   }
 }
 
-/// Checks that a peer is not admitted if the input changes its valid INITIATE.
+/// Changes bytes of a valid INITIATE as the input describes. Checks that the port does not admit
+/// the peer if any byte differs.
 void change_initiate(Zmtp& zmtp, CurveClient& client, std::string_view input) {
   be_welcomed(zmtp, client);
   const std::string sound = client.initiate();
@@ -41,8 +42,8 @@ void send_properties(Zmtp& zmtp, CurveClient& client, std::string_view input) {
 }  // namespace
 }  // namespace oblique::server
 
-/// The input is what a peer sends on one connection. Its first byte selects a port with or without
-/// keys, and which part of the handshake is valid.
+/// The input is what a peer sends on one connection. The first byte of the input selects a port
+/// with or without keys, and the part of the handshake that is valid.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace oblique::server;
   static const KeyedPort port;

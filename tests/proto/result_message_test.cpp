@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 constexpr double kNotANumber = std::numeric_limits<double>::quiet_NaN();
 
-/// Returns a result in which every field has another value.
+/// Returns a result in which no two fields have the same value.
 solver::CaseResult distinct_result() {
   solver::CaseResult result{};
   result.fall_time_s = 0.43;

@@ -24,9 +24,9 @@ struct Output {
   std::string name;
   std::string relative_to;
   std::function<std::vector<double>(const solver::CaseResult&)> values;
-  /// Scale of a value: a quantity that all values of the output share, or the value itself.
+  /// Returns the scale of a value's error: a quantity common to all values, or the value itself.
   std::function<double(const solver::CaseResult&, double value)> scale;
-  /// False if the number of values depends on ripples.
+  /// False for an output whose number of values depends on ripples of the forces.
   bool is_headline;
 };
 
@@ -73,7 +73,7 @@ Values tangential_peaks(const CaseResult& r) {
   return values;
 }
 
-/// End times of all phases except the last phase, whose end is the duration.
+/// Returns the ends of all phases except the last phase, which ends with the contact.
 Values turns(const CaseResult& r) {
   Values values;
   for (const auto& phase : r.phases) {
@@ -137,7 +137,7 @@ std::vector<Output> outputs() {
   };
 }
 
-/// Returns the largest difference of one output between two results, relative to its scale in
+/// Returns the largest difference of one output between two results, divided by the scale in
 /// `right`. Both results must have the same number of values.
 double difference(const Output& output, const std::vector<double>& values,
                   const solver::CaseResult& right) {
@@ -152,13 +152,14 @@ double difference(const Output& output, const std::vector<double>& values,
   return largest;
 }
 
-/// Whether both results have the same mode. Each output then has the same number of values in both.
+/// Returns whether both results have the same mode and the same numbers of phases and of peaks of
+/// F_t. If so, each output has the same number of values in both.
 bool have_same_turns(const solver::CaseResult& a, const solver::CaseResult& b) {
   return a.mode == b.mode && a.phases.size() == b.phases.size() &&
          a.ft_peaks.size() == b.ft_peaks.size();
 }
 
-/// Step of the explicit reference solution, at which the error of PEFRL is below 1e-9.
+/// Step of the explicit reference solution. With this step the error of PEFRL is below 1e-9.
 constexpr double kReferenceStep_s = 2e-7;
 const std::string kReference = "explicit, 0.2 us";
 
@@ -174,7 +175,8 @@ std::vector<Point> grid() {
   return points;
 }
 
-/// Bound of an output's difference. `Bounds` is ordered by the output's name and scale.
+/// Upper bound of the difference of an output. The keys of `Bounds` contain the output's name and
+/// scale.
 struct Bound {
   double value;
   std::string reason;
@@ -228,7 +230,7 @@ std::vector<std::vector<double>> values_of(const CaseResult& result) {
   return values;
 }
 
-/// Richardson extrapolation of an error of order 2: (4 f(h/2) - f(h))/3.
+/// Removes an error of order 2 by Richardson extrapolation: (4 f(h/2) - f(h))/3.
 std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const CaseResult& half) {
   auto values = values_of(half);
   const auto coarse = values_of(whole);
@@ -240,8 +242,9 @@ std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const Cas
   return values;
 }
 
-// Vibrations of w = 1.5e5 rad/s have about a tenth of the speed. The method's period error (w
-// h)^2/12 at h = 0.1 us shifts their phase by 1.4e-3 rad over a contact of T = 0.5 ms.
+// Vibrations of w = 1.5e5 rad/s make up about a tenth of the speed. The method's relative error of
+// their period is (w h)^2/12. With h = 0.1 us it shifts their phase by 1.4e-3 rad in a contact of T
+// = 0.5 ms.
 const std::string kPeriodError =
     "a tenth of the speed vibrates at w = 1.5e5/s: phase error (w h)^2/12 w T = 1.4e-3";
 const std::string kSlowExit = "the same; some exits are slow";
@@ -330,7 +333,7 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
 TEST(Agreement, EstimatedErrorsBoundTheErrorsOfTheStepsInAllOutputsAndInstantsOfSixtyContacts) {
   const solver::ModelParameters model = solver::preset("standard");
   solver::ModelParameters fine = model;
-  fine.step_factor = 0.25;  // error of order 4: 256 times smaller
+  fine.step_factor = 0.25;  // divides errors of order 4 by 256
   const solver::Finger finger(model);
   const solver::Finger companion(solver::companion_model(model));
   const solver::Finger reference(fine);

@@ -30,8 +30,8 @@ inline constexpr std::array<Point, 10> kPublishedPoints{{{1.00, 0.4, 1.0},
                                                          {1.00, 1.4, 1.0},
                                                          {1.00, 1.6, 1.0}}};
 
-/// One chain with both integrators. Both contacts start from the state at touch after an explicit
-/// fall, so results differ only by the errors in the contact.
+/// Solves contacts of one chain with both integrators. Both contacts start from the same state, at
+/// the end of an explicit fall. So the results differ only by the errors in the contact.
 class BothWays {
  public:
   explicit BothWays(const solver::ModelParameters& model)
@@ -46,7 +46,7 @@ class BothWays {
   const solver::GeneralizedAlphaMotion& by_generalized_alpha() const { return generalized_alpha_; }
   const solver::Fall& fall() const { return *fall_; }
 
-  /// The state at touch, in the coordinates of each integrator.
+  /// Return the state at touch in the coordinates of each integrator.
   solver::ChainState explicit_touch(double H_m) const { return fall_->state_at(H_m); }
   solver::ChainState generalized_alpha_touch(double H_m) const {
     return from_eliminated(generalized_alpha_.chain(), fall_->state_at(H_m));

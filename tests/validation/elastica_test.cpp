@@ -15,12 +15,13 @@ namespace oblique::validation {
 namespace {
 
 constexpr std::size_t kBandwidth = 7;
-constexpr std::size_t kClamped = 4;  ///< coordinates of the first node
+constexpr std::size_t kClamped = 4;  ///< number of coordinates of the clamped node
 constexpr double kConverged = 1e-12;
 constexpr int kMaxIterations = 50;
 
-/// A cantilever of the solver's elements in static equilibrium, which Newton's method finds with
-/// the solver's tangent. It is clamped at the origin; without load it is straight along x.
+/// A cantilever of the solver's elements in static equilibrium. Newton's method with the solver's
+/// tangent finds this state. The cantilever is clamped at the origin; without load it is straight
+/// along x.
 class ClampedBeam {
  public:
   struct Properties {
@@ -30,7 +31,7 @@ class ClampedBeam {
     int elements;
   };
   struct TipLoad {
-    double force_y_N;   ///< force of constant direction
+    double force_y_N;   ///< force whose direction is constant
     double moment_N_m;  ///< counter-clockwise
   };
   struct Tip {
@@ -176,7 +177,8 @@ ClampedBeam beam_of(int elements) {
       {kLength_m, kSlenderness * kEI_N_m2 / (kLength_m * kLength_m), kEI_N_m2, elements});
 }
 
-/// Returns the distance between the computed tip and that of the elastica, divided by the length.
+/// Returns the distance between the computed tip and the tip of the elastica, divided by the
+/// length.
 double elastica_error(double alpha, int elements) {
   ClampedBeam beam = beam_of(elements);
   beam.load_to({alpha * kEI_N_m2 / (kLength_m * kLength_m), 0.0}, 20);

@@ -18,7 +18,7 @@ using solver::Motion;
 const std::string kBalance = "kinetic + strain + gravity + springs + losses = constant";
 
 /// Returns the energy that is missing in the balance of a contact, divided by the exchanged work.
-/// Computes both from the parts of the result.
+/// Expects that the result contains the same value.
 double closure(const CaseResult& result) {
   const solver::ContactEnergy& e = result.energy;
   const double missing_J =
@@ -43,7 +43,8 @@ TEST(Energy, BalancesInThePublishedContactsWithBothIntegrators) {
        kBalance, by_generalized_alpha, 1e-6, "stated accuracy"});
 }
 
-/// Returns the change of the energy in the fall to H = 1 m, divided by the kinetic energy there.
+/// Returns the change of the total energy in the fall to H = 1 m, divided by the kinetic energy
+/// there.
 double fall_drift(const Motion& motion, const solver::Fall& fall) {
   const solver::Energies before = motion.energies(motion.at_rest());
   const solver::Energies after = motion.energies(fall.state_at(1.0));

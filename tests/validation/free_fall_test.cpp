@@ -35,8 +35,8 @@ struct FallErrors {
 
 const std::string kKnownFrom = "independent explicit solution, converged";
 
-/// Known state of three rigid links, computed in minimal coordinates by a Runge-Kutta method. It
-/// does not depend on A and I.
+/// Known state of three rigid links, computed in minimal coordinates by a Runge-Kutta method. The
+/// state does not depend on A and I.
 constexpr std::array<KnownFall, 1> kRigid{
     {{1.00, 0.430188812, std::numeric_limits<double>::quiet_NaN(), -5.738072, -5.234437}}};
 

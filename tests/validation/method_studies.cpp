@@ -68,12 +68,12 @@ std::vector<CaseResult> contacts_of(const solver::Finger& finger,
 // ---- Meshes ----
 
 constexpr double kTolerance = 0.005;  // relative
-// A mesh is fine enough if each output is within the tolerance at this fraction of the points. All
-// points would be too strict, because exit velocities pass through zero.
+// A mesh is fine enough if each output is within the tolerance at this fraction of the points. The
+// fraction is below 1 because exit velocities pass through zero, where relative errors are large.
 constexpr double kMaxPoints = 0.8;
 
-/// Errors of one output of a point relative to its limit, one per level. A level whose mode differs
-/// from that of the finest level has no error.
+/// Errors of one output at one point, one error per level of the mesh, relative to the limit of the
+/// output. A level has no error if its mode differs from the mode of the finest level.
 struct PointErrors {
   std::size_t point;
   double limit;
@@ -96,8 +96,9 @@ std::size_t points_within(const OutputStudy& output, std::size_t level) {
                     [&](const PointErrors& point) { return is_within(point.errors[level]); }));
 }
 
-/// Returns the name under which an output counts. All peaks of F_n, which include fn_peak_N, count
-/// as one output with the largest of their errors; so do all reactions.
+/// Returns the name under which the errors of an output are collected. All major peaks of F_n,
+/// which include fn_peak_N, count as one output with the largest of their errors. All reactions
+/// also count as one output.
 std::string counted_under(const std::string& name) {
   return name.starts_with("major_peak") ? "major_peaks_N"
          : name.starts_with("reaction") ? "reaction_peaks_N"
@@ -166,8 +167,8 @@ void print_cells(const std::vector<Level>& levels, const std::vector<OutputStudy
   print(std::cout, table, Format::kTable);
 }
 
-/// Returns the coarsest level for which it and all finer levels are fine enough, or the number of
-/// levels if there is none.
+/// Returns the coarsest level from which on all levels are fine enough, or the number of levels if
+/// there is none.
 std::size_t coarsest_good_enough(std::size_t levels, const std::vector<OutputStudy>& outputs) {
   const auto is_good_enough = [&](std::size_t level) {
     return std::all_of(outputs.begin(), outputs.end(), [&](const OutputStudy& output) {
@@ -256,7 +257,7 @@ struct StepCase {
   solver::ModelParameters model;
   std::size_t points = 300;
   double least_e =
-      solver::StepChoice::kFastRestitution;  ///< smallest e*; smaller values need shorter steps
+      solver::StepChoice::kFastRestitution;  ///< smallest e*; below it, shorter steps are needed
   double largest_e = 1.0;
   std::vector<double> factors{1.0};  ///< factors that multiply the chosen steps
 };
@@ -265,14 +266,14 @@ struct StepCase {
 struct StepErrors {
   double step_s = 0.0;     ///< in compression
   double of_limit = 0.0;   ///< step in compression, divided by the longest stable step
-  double peaks = 0.0;      ///< error of major peaks of F_n, relative to the largest
+  double peaks = 0.0;      ///< error of major peaks of F_n, relative to the largest peak
   double each_peak = 0.0;  ///< error of major peaks of F_n, relative to each peak
   double duration = 0.0;   ///< relative
   double slide = 0.0;      ///< relative
   double stick_s = 0.0;
-  double exit_m_s = 0.0;         ///< error of the exit velocity: larger component
+  double exit_m_s = 0.0;         ///< larger error of both components of the exit velocity
   std::int64_t late_sticks = 0;  ///< points whose stick has an error above 5 ns
-  std::int64_t grazing = 0;      ///< excluded points, whose mode differs between the steps
+  std::int64_t grazing = 0;      ///< points left out because their mode depends on the step
 };
 
 /// Returns variations of the preset `paper`: mesh, contact stiffness, e*, tip mass and lengths.
@@ -304,8 +305,9 @@ std::vector<StepCase> step_cases() {
   return cases;
 }
 
-/// Returns fixed points that are spread evenly in H, mu and e*. They follow an additive recurrence
-/// with the powers of 1/1.2207, where 1.2207 is the root of x^4 = x + 1.
+/// Returns points that are spread evenly in H, mu and e*, the same in every run. They follow an
+/// additive recurrence with the first three powers of 1/x, where x = 1.2207 is the root of x^4 = x
+/// + 1.
 std::vector<ContactPoint> step_points(const StepCase& of, double largest_drop_m) {
   constexpr double kRoot = 1.2207440846057596;
   const auto between = [](double least, double largest, std::size_t i, double step) {
@@ -347,7 +349,7 @@ void judge(const CaseResult& result, const CaseResult& reference, StepErrors& er
   }
 }
 
-/// Returns one row for each factor of the case.
+/// Returns the errors for each step factor of the case.
 std::vector<StepErrors> step_errors(const StepCase& of) {
   constexpr double kReferenceFactor = 1.0 / 6.0;
   const auto fallen = fall_of(of.model);

@@ -109,11 +109,12 @@ Outcome in_constrained_coordinates(Outcome outcome, const solver::GeneralizedAlp
   return outcome;
 }
 
-/// Collects the smallest observed order of each part over several runs.
+/// Collects the smallest observed order of convergence of each part of an Outcome over several
+/// runs.
 class SmallestOrders {
  public:
-  /// Adds the order that follows from the errors of two runs against `right`. The second run has
-  /// half the step of the first.
+  /// Adds the orders that follow from the errors of two runs. The second run has half the step of
+  /// the first. `right` is the exact outcome.
   void add(const Outcome& at_step, const Outcome& at_half, const Outcome& right) {
     for (std::size_t i = 0; i < kParts.size(); ++i) {
       const auto part = kParts[i].values;
@@ -150,15 +151,15 @@ class SmallestOrders {
   std::array<double, kParts.size()> smallest_{HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
 };
 
-/// The links are so soft that the fall bends them far. With the paper's links, the vibration in the
-/// fall is so small that rounding dominates at half the step.
+/// Returns a chain of links so soft that the fall bends them far. The paper's links vibrate so
+/// little in the fall that rounding would dominate the errors.
 solver::ModelParameters soft_chain() {
   solver::ModelParameters model = solver::preset("paper");
   model.E_Pa *= 1e-4;
   return model;
 }
 constexpr double kFall_s = 0.2;
-/// This time is before the end of the shortest of the ten contacts.
+/// A time before the end of the shortest of the ten contacts.
 constexpr double kContact_s = 330e-6;
 
 TEST(Order, OfTheExplicitIntegratorIsFourInTheFall) {

@@ -29,7 +29,7 @@ ModelParameters pendulum() {
   return model;
 }
 
-/// A thousandth of the stiffness makes bending and stretching of the swinging link visible.
+/// With a thousandth of the stiffness, the swinging link bends and stretches measurably.
 ModelParameters soft_pendulum() {
   ModelParameters model = pendulum();
   model.E_Pa *= 1e-3;
@@ -41,7 +41,7 @@ double energy_J(const Motion& motion, const ChainState& state) {
   return energies.kinetic_J + energies.strain_J + energies.gravity_J;
 }
 
-/// Final state of a run from rest, and its largest deviation of the energy.
+/// Final state of a run from rest, and the largest change of the energy during the run.
 struct Swing {
   ChainState state;
   double energy_drift_J = 0.0;
@@ -138,7 +138,7 @@ TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
 /// phi.
 double half_period_s(const Motion& motion, const ChainState& start, double dt_s) {
   const auto product = [&](const ChainState& state) {
-    // Computes a^T M b, up to a factor, from kinetic energies T: T(a + b) - T(a - b). a is the
+    // Computes a^T M b up to a factor, as T(a + b) - T(a - b) with the kinetic energy T. a is the
     // transverse displacement, b the mode.
     ChainState sum = start;
     ChainState difference = start;
@@ -162,7 +162,7 @@ TEST(Pendulum, VibratesAtTheFirstFrequencyOfAPinnedFreeBeam) {
         std::sqrt(model.E_Pa * model.I_m4 / (model.rho_kg_m3 * model.A_m2));
     const Chain chain(model);
     ChainState start = chain.at_rest();
-    constexpr double kSpeed_m_s = 1e-4;  // so small that the vibration is linear
+    constexpr double kSpeed_m_s = 1e-4;  // a speed so low that the vibration is linear
     for (Eigen::Index row = 0; row < chain.rows(); ++row) {
       const double z = kRoot * static_cast<double>(row / 2) / elements;
       const bool is_slope = row % 2 == 1;

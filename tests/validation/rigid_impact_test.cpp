@@ -23,8 +23,8 @@ using solver::RigidImpact;
 
 const std::string kReference = "Stronge, rigid body, closed form";
 
-/// A free rod of 0.5 kg strikes the ground with its end, at 30 degrees: W = (1/m) [1 + 3 sin^2, -3
-/// sin cos; -3 sin cos, 1 + 3 cos^2].
+/// Returns a free rod of 0.5 kg, inclined by 30 degrees, that strikes the ground with one end: W =
+/// (1/m) [1 + 3 sin^2, -3 sin cos; -3 sin cos, 1 + 3 cos^2].
 RigidImpact::Parameters flying_rod(double mu, double e_star, double vt_m_s) {
   const double c = std::cos(M_PI / 6.0);
   const double s = std::sin(M_PI / 6.0);
@@ -45,8 +45,8 @@ CaseResult solved(const RigidImpact::Parameters& p, double dt_s) {
                                motion.moving(p.V0_m_s), {});
 }
 
-/// Returns the largest relative error of force peaks (scale: largest force), duration, exit
-/// velocity (scale: speed at touch), slide (scale: that speed times the duration) and stick.
+/// Returns the largest error of force peaks (relative to the largest force), exit velocity (to the
+/// speed at touch), slide (to that speed times the duration), duration and stick (to the duration).
 double largest_error(const CaseResult& result, const RigidImpact& right, double speed_m_s) {
   double largest = std::abs(result.duration_s / right.duration_s() - 1.0);
   EXPECT_EQ(result.peaks.size(), right.fn_peaks_N().size());
@@ -128,7 +128,7 @@ struct StiffLinks {
     mass *= model.rho_kg_m3 * model.A_m2 * kLength_m * kLength_m * kLength_m;
     RigidImpact::Parameters p;
     p.W_per_kg = J * mass.inverse() * J.transpose();
-    // A hundredth of the finger's contact stiffness makes the links deform less.
+    // The contact has a hundredth of the finger's stiffness, so that the links deform less.
     p.k_N_m = 2.7e5;
     p.eta2 = model.eta2;
     p.mu = mu;
@@ -141,7 +141,8 @@ struct StiffLinks {
   solver::ChainState state(const solver::Chain& chain, const Eigen::Vector2d& V_m_s) const {
     const Eigen::Vector2d rate = J.inverse() * V_m_s;
     solver::ChainState state = chain.at_rest();
-    // Rows of q: pin, slope; inner link's end slope, joint, outer link's first slope; tip, slope.
+    // Rows of q: pin and its slope; slope of the inner link at the joint, joint, slope of the outer
+    // link at the joint; tip and its slope.
     const Eigen::Index link_of[7] = {0, 0, 0, 0, 1, 1, 1};
     const bool is_slope[7] = {false, true, true, false, true, false, true};
     const Eigen::Vector2d joint_m = J.col(0).reverse().cwiseProduct(Eigen::Vector2d(1.0, -1.0));
@@ -207,7 +208,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithExplicitSteps) {
 }
 
 TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithGeneralizedAlpha) {
-  // With this integrator the steps need not shrink with the stiffness.
+  // This integrator does not need shorter steps for stiffer links.
   const StiffLinks links(1e6);
   const solver::Chain chain(links.model);
   const solver::GeneralizedAlphaMotion motion(links.model);

@@ -16,7 +16,7 @@ struct Check {
 /// Adds a line to the table, and fails the running test unless measured <= bound. Texts must not
 /// contain '|', which separates the columns.
 void expect_at_most(const Check& check);
-/// Does the same with measured >= bound.
+/// Like expect_at_most(), but requires measured >= bound.
 void expect_at_least(const Check& check);
 
 }  // namespace oblique::validation

@@ -39,15 +39,16 @@ ModelParameters link(double length_m, int elements) {
   return model;
 }
 
-/// Returns a horizontal link that rotates about its pin. Its tip, where waves start, has V0 down.
+/// Returns a horizontal link that rotates about its pin. The tip, where waves start, moves down at
+/// V0.
 ChainState turning(const Chain& chain, double length_m) {
   ChainState state = chain.at_rest();
   state.v.row(1) = -kV0_m_s / length_m * state.q.row(0);
   return state;
 }
 
-/// Returns a link that hangs straight down. All nodes except the pinned one move down at V0. A wave
-/// starts at the pin with the speed of sound.
+/// Returns a link that hangs straight down. All nodes except the pin move down at V0. A wave starts
+/// at the pin with the speed of sound.
 ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   ChainState state = chain.at_rest();
   state.q.row(1) = -state.q.row(0);
@@ -58,7 +59,7 @@ ChainState falling_along(const Chain& chain, const ModelParameters& model) {
   return state;
 }
 
-/// Returns the largest difference between contact force and `right`, divided by `scale_N`.
+/// Returns the largest difference between the contact force and `right`, divided by `scale_N`.
 double force_error(const Motion& motion, const solver::AffineContactForce<double>& force,
                    ChainState state, double dt_s, double duration_s, double scale_N,
                    const std::function<double(double)>& right) {
@@ -115,9 +116,9 @@ TEST(Waves, BeamTipOnASpringHasTheForceOfASemiInfiniteBeam) {
   }
 }
 
-/// Returns a rod so long that the wave from the pin does not arrive. It has almost no bending
-/// stiffness, because the paper's curvature includes r'' along the beam, which would stiffen short
-/// waves.
+/// Returns a rod so long that the wave from the pin does not reach the tip. The rod has almost no
+/// bending stiffness. The paper's curvature includes r'' along the beam, so bending stiffness would
+/// stiffen short axial waves.
 ModelParameters rod_of(int elements) {
   ModelParameters model = link(0.8, elements);
   model.I_m4 = 1e-16;

@@ -65,7 +65,7 @@ std::string bits_of(const protocol::PointResult& result) {
   return protocol::to_message(0, outputs).SerializeAsString();
 }
 
-/// Adds a model axis to the only block, after other model axes and before H, mu and e.
+/// Adds a model axis to the only block. The axis follows other model axes and precedes H, mu and e.
 void add_model_axis(protocol::Recipe& recipe, const char* key, const std::vector<double>& values) {
   protocol::Block& block = *recipe.mutable_blocks(0);
   protocol::Axis& axis = *block.add_axes();
@@ -164,7 +164,7 @@ TEST(PointsOfABatch, APointWithAForbiddenValueFailsAndNamesItsValues) {
 }
 
 TEST(PointsOfABatch, AnInvalidModelFailsEachOfItsPointsWithTheReason) {
-  // A recipe allows any positive step; the solver requires a stable one.
+  // A recipe may contain any positive step, but the solver requires a stable step.
   protocol::Recipe recipe = recipe_with_points(3);
   solver::ModelParameters model = solver::preset("paper");
   model.dt_s = 1.0;
@@ -268,7 +268,7 @@ void expect_traces_to_repeat(solver::Integrator integrator, std::size_t points, 
   model.integrator = integrator;
   model.elements_per_link = 2;
   if (integrator == solver::Integrator::kGeneralizedAlpha) {
-    model.dt_fall_s = 1e-3;  // longer than the default, to save time
+    model.dt_fall_s = 1e-3;  // a longer step than the default, to save time
   }
   protocol::Recipe recipe = recipe_with_points(points);
   *recipe.mutable_model() = protocol::to_message(model);

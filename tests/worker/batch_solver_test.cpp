@@ -36,10 +36,10 @@ Batch filtered_batch(const std::vector<Batch::Range>& ranges, const std::string&
   return {1, 7, ranges, points};
 }
 
-/// Holds each point in the solver until the test lets it end.
+/// Makes each point wait in the solver until the test lets it end.
 class Gate {
  public:
-  /// Counts a point as begun and waits until it may end. The solver calls this.
+  /// Called by the solver for each point. Counts the point as begun and waits until it may end.
   void pass() {
     std::unique_lock lock(mutex_);
     ++begun_;
@@ -68,7 +68,7 @@ class Gate {
   int open_ = 0;
 };
 
-/// Reports all points of a source as failed. Calls `before` before each report.
+/// Reports each of these points as failed. Calls `before` before each report.
 void fail_all(
     solver::PointSource& points, const solver::TakeOutcome& take,
     const std::function<void()>& before = [] {}) {
@@ -276,7 +276,7 @@ TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolve
       [&](const Batch& at_hand, auto& points, const auto& take) {
         if (at_hand.number() == 1 && ++taken_up > 2) {
           ADD_FAILURE() << "a dropped batch was started";
-          std::abort();  // otherwise the test would never end
+          std::abort();  // a failure alone would not end this test
         }
         fail_all(points, take, [&] {
           if (at_hand.number() == 1) {

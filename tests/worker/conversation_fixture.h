@@ -89,7 +89,8 @@ inline protocol::ServerToWorker heartbeat_reply_message() {
   return message;
 }
 
-/// A worker's conversation with time and messages from the test. Keeps the last event's effects.
+/// A worker's conversation whose time and messages come from the test. Keeps the effects of the
+/// last event.
 class ConversationTest : public ::testing::Test {
  protected:
   void start() { take(conversation_->start(now_ms_)); }
@@ -181,7 +182,7 @@ class ConversationTest : public ::testing::Test {
     return batches;
   }
 
-  /// Returns nothing until the conversation has ended.
+  /// Returns nothing while the conversation has not ended.
   std::optional<int> exit_code() const {
     return finish() ? std::optional(finish()->exit_code) : std::nullopt;
   }

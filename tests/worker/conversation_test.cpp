@@ -91,7 +91,7 @@ TEST_F(ConversationTest, AfterSilenceTheWorkerReconnectsAndAnyMessageEndsTheSile
 
 TEST_F(ConversationTest, AnUnansweredHelloIsRepeatedAfterAPauseThatDoublesToTwoSeconds) {
   start();
-  std::int64_t patience_ms = 3000;  // doubles each time up to 12 s, for slow networks
+  std::int64_t patience_ms = 3000;  // timeout that doubles up to 12 s, for slow networks
   for (const std::int64_t backoff_ms : {50, 100, 200, 400, 800, 1600, 2000, 2000}) {
     pass(patience_ms - 1);
     EXPECT_EQ(conversation_->next_deadline_ms(), now_ms_ + 1);
@@ -207,7 +207,7 @@ TEST_F(ConversationTest, ABatchOfAnUnknownStudyOrUnknownPointsMakesTheWorkerReco
 TEST_F(ConversationTest, ABatchMayBeSeveralRangesInAnyOrder) {
   join();
   auto message = batch_message(7, 31, 20, 10);
-  for (const std::int64_t number : {-25, 2, 90, 3}) {  // points 5 and 6, then 97 to 99
+  for (const std::int64_t number : {-25, 2, 90, 3}) {  // adds points 5 and 6, then 97 to 99
     message.mutable_batch()->add_ranges(number);
   }
   receive(message);
@@ -328,7 +328,7 @@ TEST_F(ConversationTest, ASecondStopEndsTheWorkerAtOnceUnlessItFollowsWithinASec
 
 // ---- --until and --idle-exit --------------------------------------------------------------------
 
-/// Starts workers with a limit of time or idle time. They leave 3 s before the limit of time.
+/// Starts workers with a time limit or an idle limit. They leave 3 s before the time limit.
 class ExitTest : public ConversationTest {
  protected:
   void leave_within(std::int64_t duration_ms, std::int64_t idle_exit_ms = kNever_ms) {

@@ -19,7 +19,7 @@ namespace {
 
 using protocol::WorkerMessage;
 
-/// Returns a welcome after which the worker waits for a slow server.
+/// Returns a welcome with a timeout of ten minutes, so that the worker waits for a slow server.
 protocol::ServerToWorker patient_welcome() {
   protocol::ServerToWorker welcome = welcome_message();
   welcome.mutable_welcome()->set_lost_after_ms(600'000);
@@ -66,7 +66,7 @@ class ScriptedServer {
     socket_.send(zmq::buffer(frame));
   }
 
-  /// Welcomes the worker and leases it points 0 to `count − 1` of study 7.
+  /// Welcomes the worker and sends it a batch of points 0 to `count − 1` of study 7.
   void welcome_and_hand_out(std::uint64_t count) {
     wait_for(WorkerMessage::kHello);
     protocol::ServerToWorker welcome = patient_welcome();

@@ -32,7 +32,7 @@ protocol::TraceOrder order(std::uint64_t id, std::uint64_t every = 1) {
   return order;
 }
 
-/// Solves each trace with 5 rows. After `hold`, waits for `release` first.
+/// Solves each trace with 5 rows. After `hold`, a trace first waits for `release`.
 class Solving {
  public:
   TraceSolver::Solve solve() {
@@ -64,7 +64,7 @@ protocol::Trace answer_of(TraceSolver& solver) {
   }
 }
 
-/// Adds a fall of 3 rows and a contact of `instants` rows to TraceRows, which keep at most
+/// Passes a fall of 3 rows and a contact of `instants` rows to TraceRows, which keep at most
 /// `most_rows` rows. The second third of the contact is restitution. Fills `trace` and returns the
 /// times of its rows.
 std::vector<double> times_of(std::uint64_t every, int instants, std::size_t most_rows,
@@ -112,7 +112,7 @@ TEST(TraceRowsTest, TooManyRowsAreRefusedWithAnIntervalThatFits) {
 
 TEST(TraceRowsTest, IfNoIntervalFitsTheAnswerExceedsTheNumberOfInstants) {
   protocol::Trace trace;
-  // The fall, the ends of phases and the last row alone exceed 5 rows.
+  // The rows of the fall, the ends of phases and the last row are already more than 5 rows.
   EXPECT_TRUE(times_of(1, 100, 5, trace).empty());
   EXPECT_EQ(trace.every(), trace.instants() + 1);
 }

@@ -67,7 +67,7 @@ void check(const test::Outcome& ran) {
   }
 }
 
-/// Folder for the server of one row; also holds its keys if the server uses keys.
+/// Folder for the server of one table row. Also contains the server's keys, if keys are used.
 struct Place {
   explicit Place(bool with_keys) {
     if (with_keys) {

@@ -95,7 +95,7 @@ class LoadGenerator::Parts {
     worker::Conversation conversation;
     std::optional<zmq::socket_t> socket;
     std::deque<Job> jobs;
-    double solving_since_s = 0.0;  // when the unreported points of the first job began
+    double solving_since_s = 0.0;  // start of solving the unreported points of the first job
   };
 
   void run() {
@@ -135,9 +135,8 @@ class LoadGenerator::Parts {
     }
   }
 
-  /// Receives all messages and reports due points, until there are no more of either. One pass is
-  /// not enough, because sending may reset the readiness of the descriptor (ZMQ_FD is
-  /// edge-triggered).
+  /// Receives messages and reports due points, repeatedly, until neither is left. The repetition is
+  /// needed because sending may clear the readiness of the descriptor (ZMQ_FD is edge-triggered).
   void work_on(std::size_t number) {
     receive_all(number);
     while (report_due(number) && receive_all(number)) {
@@ -160,7 +159,8 @@ class LoadGenerator::Parts {
     return any;
   }
 
-  /// Reports the points of the first batch that are solved by now. Returns false if there are none.
+  /// Reports solved points of the first batch in at most one message. Returns false if no report is
+  /// due.
   bool report_due(std::size_t number) {
     Member& member = *members_[number];
     if (member.jobs.empty() || !member.conversation.may_solve()) {
@@ -269,7 +269,7 @@ class LoadGenerator::Parts {
   std::atomic<std::uint64_t> welcomed_ = 0;
   std::atomic<double> longest_gap_s_ = 0.0;
   std::atomic<bool> stopping_ = false;
-  std::thread thread_;  // declared last: it uses the other members
+  std::thread thread_;  // declared last, because it uses the other members
 };
 
 std::size_t bytes_of_result() {

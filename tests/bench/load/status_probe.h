@@ -19,7 +19,7 @@ class StatusProbe {
   struct Seen {
     std::vector<double> latencies_ms;  ///< ascending
     std::uint64_t unanswered = 0;      ///< requests
-    std::uint64_t settled = 0;         ///< points with an answer according to the last reply
+    std::uint64_t settled = 0;         ///< number of solved and failed points in the last reply
     std::uint64_t leased = 0;
     std::uint32_t workers = 0;
 
@@ -45,7 +45,7 @@ class StatusProbe {
   std::optional<protocol::KeyFile> key_;
   std::string study_;
   std::chrono::milliseconds interval_;
-  Seen seen_;  // written by the thread until it ends
+  Seen seen_;  // written only by `thread_` while it runs
   std::atomic<bool> stopping_ = false;
   std::thread thread_;
 };

@@ -152,8 +152,8 @@ TEST_F(KeyFileTest, ErrorsHaveFileLineAndKeyAndNoSecret) {
               AllOf(HasSubstr("none.key"), HasSubstr("No such file")));
 }
 
-/// Writes a key file in a child process, so that a reader has the only copy of the secret in
-/// memory. Returns `path`.
+/// Writes a key file in a child process, so that the secret is not yet in the memory of this
+/// process. Returns `path`.
 std::string file_of_another_process(const std::string& path) {
   const pid_t writer = fork();
   if (writer == 0) {
@@ -192,8 +192,8 @@ TEST_F(KeyFileTest, TheSecretIsInLockedMemoryAndNotInACoreDump) {
   const KeyFile key = read_key_file(file_of_another_process(folder_.file("worker.key")));
   expect_no_copy_in_a_core_dump(key.pair.secret_key);
   // A core dump must not contain the secret as text either. The test searches for the end of the
-  // text, because freeing memory overwrites its beginning. The searched bytes themselves are in
-  // memory that core dumps leave out.
+  // text, because freeing memory overwrites its beginning. `end` itself is in memory that core
+  // dumps leave out.
   constexpr std::size_t kEnd = 24;
   SecretKey end;
   std::string text = z85(key.pair.secret_key.bytes());

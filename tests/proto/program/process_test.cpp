@@ -89,8 +89,8 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
   EXPECT_TRUE(received().empty());
 }
 
-/// Returns the result of `stop_with_parent` in a child process, and whether the child gets SIGTERM
-/// when its parent ends.
+/// Calls `stop_with_parent` in a child process. Returns its result, and whether the child will get
+/// SIGTERM when its parent ends.
 std::pair<bool, bool> stops_with(pid_t parent) {
   const pid_t child = fork();
   if (child == 0) {
@@ -136,7 +136,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
 TEST(StopSignals, TheDestructorRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
-    raise(SIGTERM);  // a pending SIGTERM would end this process below
+    raise(SIGTERM);  // if it stayed pending, it would end this process below
   }
   sigset_t blocked;
   ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);

@@ -28,8 +28,8 @@ TEST(AxisTest, ARangeHasExactEndsAndRisesBetweenThem) {
   }
 }
 
-// Tests 1,000 grids that start between 0 and 5, or at 1e7. Their steps are up to 50 units of the
-// last decimal.
+// Tests 1,000 grids that start at 1e7 or between 0 and 5. A step is at most 50 units of the last
+// decimal.
 TEST(AxisTest, EveryValueOfADecimalGridEqualsTheTypedNumber) {
   std::mt19937 random(1);
   const auto pick = [&](int from, int to) {

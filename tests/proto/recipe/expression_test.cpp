@@ -18,7 +18,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// Parses an expression. Appends its names to `names`, each once, in the order of the text.
+/// Parses an expression. Appends each of its names once to `names`, in the order of the text.
 Expression read(const std::string& text, std::vector<std::string>& names) {
   return Expression(text, [&](std::string_view name) {
     const auto found = std::find(names.begin(), names.end(), name);

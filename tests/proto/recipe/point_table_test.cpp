@@ -35,7 +35,8 @@ struct ExpectedPoint {
   double e_star;
 };
 
-/// Appends a block's points to `points` by nested loops over its axes, the first axis outermost.
+/// Appends the points of a block to `points` by nested loops over its axes. The first axis is the
+/// outermost loop.
 void enumerate(const Block& block, int depth, ExpectedPoint current,
                std::vector<ExpectedPoint>& points) {
   if (depth == block.axes_size()) {
@@ -268,7 +269,8 @@ TEST(StudySize, CountsNoFallOfPointsThatAFilterLeavesOut) {
   EXPECT_THAT(size.examples, Each(AllOf(Ge(15U), Le(20U))));
 }
 
-// A third of 10^4 examined points pass; 0.02 is four standard deviations of that share.
+// A third of 10^4 examined points pass the filter. The tolerance of this share, 0.02, is four
+// standard deviations.
 TEST(StudySize, EstimatesThePointsThatPassAFilterInALargeStudy) {
   const Block plain = filtered({kSomeH, range("mu", 0.0, 1.0, 1'000), kSomeE}, "");
   const Block large = filtered({kSomeH, range("mu", 0.0, 3.0, 3'000'000), kSomeE}, "mu < 1");

@@ -36,7 +36,7 @@ const Axis kH = listed("H", {0.5});
 const Axis kMu = listed("mu", {0.4});
 const Axis kE = listed("e", {1.0});
 
-/// Return a block with the given axis of mu, and one with an additional axis for a model parameter.
+/// Return a block that contains the given axis.
 Block of_mu(const Axis& mu) {
   return filtered({listed("H", {1.0}), mu, kE}, "");
 }
@@ -73,7 +73,7 @@ Axis with_value(Axis axis, double value) {
 
 struct Refused {
   Block block;
-  std::string key = {};       ///< key of the error
+  std::string key = {};       ///< key that the error names
   std::string expected = {};  ///< part of the message; empty if the block is allowed
 };
 

@@ -27,8 +27,8 @@ using protocol::SAMPLE_SOBOL;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Returns a digest of the coordinates of points in all dimensions. Each coordinate times 2^64 is
-/// eight bytes, least significant byte first.
+/// Returns a digest of the coordinates of points in all dimensions. Before hashing, each coordinate
+/// is multiplied by 2^64 and written as eight bytes, least significant byte first.
 std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   std::string bytes;
   for (std::uint64_t index = first; index < first + count; ++index) {
@@ -42,8 +42,8 @@ std::string digest_of_points(std::uint64_t first, std::uint64_t count) {
   return protocol::sha256_of(bytes);
 }
 
-// Digests of the points of boost::random::sobol(32), Boost 1.74. Boost leaves out the origin, so
-// its point i is our point i + 1. The later points follow `seed(2^40 - 17)`.
+// Digests of points of boost::random::sobol(32) in Boost 1.74. Boost leaves out the origin, so its
+// point i is our point i + 1. The points of the second digest follow `seed(2^40 - 17)`.
 TEST(SobolTest, AllDimensionsEqualThoseOfBoost) {
   EXPECT_EQ(digest_of_points(1, 4096),
             "9ec19155dfd8ef8b7ce1b7bd2e7c349bf4734b172ed36d96519d9b3f7f30f0dc");
@@ -104,7 +104,7 @@ TEST(SampleTest, RandomAndSobolPointsKeepTheirValuesWhenTheCountGrowsUnlikeLatin
   }
 }
 
-// Stored studies rely on these points, so they must not change.
+// Stored studies depend on these points, so the points must not change.
 TEST(SampleTest, ValuesAreThoseOfTheFirstVersion) {
   for (const auto& [kind, of_first, of_last] :
        {std::tuple{SAMPLE_RANDOM, 0.73936814972315379, 0.22969086515040626},
@@ -133,8 +133,8 @@ Quantiles normal(double mean, double sd, double from, double to) {
   return of_kind(protocol::DISTRIBUTION_NORMAL, from, to, mean, sd);
 }
 
-/// Returns the mean of `of` over kParts quantiles of equal probability, which approximates its
-/// expected value.
+/// Approximates the expected value of `of` by its mean over kParts quantiles with equally spaced
+/// probabilities.
 double mean_of(const Quantiles& distribution, const std::function<double(double)>& of) {
   constexpr int kParts = 100'000;
   double sum = 0.0;
@@ -209,7 +209,7 @@ TEST(DistributionTest, ValuesRiseWithTheFractionAndStayBetweenTheEnds) {
   EXPECT_FALSE(std::isnormal(normal(0.0, 1.0, 38.0, 39.0).part_left()));
 }
 
-// Stored studies rely on these values, up to the last bits of <cmath>.
+// Stored studies depend on these values. Only the last bits may differ between versions of <cmath>.
 TEST(DistributionTest, ValuesAreThoseOfTheFirstVersion) {
   EXPECT_DOUBLE_EQ(uniform(0.3, 1.1).value_at(0.123), 0.39839999999999998);
   EXPECT_DOUBLE_EQ(log_uniform(0.01, 2.0).value_at(0.123), 0.019187866556359772);

@@ -22,8 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Two databases in read-only folders. Both files have two rows; one folder has a third row in a
-/// log.
+/// Provides two databases in read-only folders. Both database files have two rows. One database
+/// also has a third row in its log.
 class ReadOnlyFolderTest : public StoreFixture {
  protected:
   ReadOnlyFolderTest() {
@@ -48,8 +48,8 @@ class ReadOnlyFolderTest : public StoreFixture {
     return folder_.file(name + "/some % results?.db");
   }
 
-  /// Runs `what` as a user who can write only in `out`, because root could write everywhere. Then
-  /// ends the process, with status 0 if `what` returned true.
+  /// Runs `what` as a user who can write only in `out`; root could write everywhere. Then ends the
+  /// process, with status 0 if `what` returned true.
   void exit_as_other_user(const std::function<bool()>& what) const {
     constexpr uid_t kNoProcess = 65534;
     if (::geteuid() == 0 && (::setgid(kNoProcess) != 0 || ::setuid(kNoProcess) != 0)) {

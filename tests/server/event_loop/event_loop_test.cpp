@@ -164,7 +164,7 @@ TEST_F(EventLoopTest, ALongRecipeIsStoredAndLeasedWithoutDelayingOthers) {
   EXPECT_TRUE(worker.receive().has_batch());
 }
 
-/// SQLite compares bytes for hours in this query, without checking for an interrupt.
+/// In this query SQLite compares bytes for hours without checking for an interrupt.
 constexpr const char* kUninterruptible =
     "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
@@ -182,7 +182,8 @@ TEST_F(EventLoopTest, TheQueriesOfAClientEndWithItsConnection) {
   QueueSettings queue;
   queue.readers = 2;
   ClientHandlerSettings clients;
-  // Without periodic replies only the closed connection shows that the client is gone.
+  // The server sends no periodic replies here. So only the closed connection shows that the client
+  // is gone.
   clients.still_working_every_ms = 1'000'000;
   RunningServer server(path_, queue, {}, clients);
   for (int i = 0; i < 2; ++i) {
@@ -236,8 +237,8 @@ std::size_t resident_bytes() {
   return resident_pages * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
 }
 
-/// Returns the memory that `bytes` bytes of the server may take with a sanitizer. The address
-/// sanitizer adds only one byte per eight.
+/// Returns the memory that `bytes` bytes of the server take in this build. The eighth that the
+/// address sanitizer adds is neglected.
 constexpr std::size_t with_shadows(std::size_t bytes) {
 #if defined(__SANITIZE_THREAD__)
   return 5 * bytes;  // the thread sanitizer needs four more bytes per byte

@@ -75,7 +75,7 @@ class RunningServer {
     settings.worker_port = "*";
     settings.client_port = "*";
     settings.service.solver_version = "1.0";
-    // The server must not drop simulated workers, which send no heartbeats and may be slow.
+    // A long timeout, because simulated workers send no heartbeats and may be slow.
     settings.service.scheduler.lost_after_ms = kLongestSilence_ms;
     settings.queries.reader_program = OBLIQUE_SERVER_PROGRAM;
     return settings;

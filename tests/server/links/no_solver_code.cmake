@@ -1,4 +1,5 @@
-# Fails if a linked target or a symbol of a program belongs to the solver, except to its model/.
+# Fails if a program links a target of the solver or contains its symbols. The folder
+# worker/solver/model/ does not count as part of the solver.
 #   cmake -DPROGRAM=oblique-server -DTARGETS=a,b,c -DSOLVER_ARCHIVES=x.a,y.a -DNM=nm -P no_solver_code.cmake
 cmake_minimum_required(VERSION 3.25)
 string(REPLACE "," ";" TARGETS "${TARGETS}")

@@ -97,7 +97,7 @@ class SalvageTest : public MaintenanceTest {
 };
 
 TEST_F(SalvageTest, ReadableRowsOfADamagedFileAreSavedAndTheOtherPointsAreOpen) {
-  constexpr std::uint64_t kPoints = 1500;  // with more points, the root page of their B-tree splits
+  constexpr std::uint64_t kPoints = 1500;  // more points would split the root page of the B-tree
   const std::string whole = folder_.file("whole.db");
   const auto large = study_of(kPoints);
   Store(whole).commit(std::vector<Change>{large, worker(1), solved(large, numbers(0, kPoints)),
@@ -294,7 +294,8 @@ TEST_F(MaintenanceTest, ADoneStudyWithRowsDeletedByHandIsSound) {
   EXPECT_THAT(diagnose(path_).remarks, Contains("study a is done: 7 of 10 points have a result"));
 }
 
-/// Provides a database with three completed points, the last failed. The rows have no checksums.
+/// Provides a database with three completed points, of which point 2 has failed. The rows have no
+/// checksums.
 class RowFaultsTest : public StoreFixture {
  protected:
   RowFaultsTest() {
@@ -389,7 +390,7 @@ TEST_F(OfflineStudyTest, ADeletedStudyLeavesNothingBehind) {
   commit({solved(study_, numbers(5, 10))});
   close();
   EXPECT_TRUE(delete_study(path_, 1));
-  { const Store next(path_); }  // opening the database deletes orphaned rows
+  { const Store next(path_); }  // opening the database deletes rows of deleted studies
   for (const char* table :
        {"studies", "models", "workers", "results", "completed_ranges", "deletions"}) {
     EXPECT_EQ(number(std::string("SELECT count(*) FROM ") + table), 0) << table;
@@ -406,7 +407,7 @@ TEST_F(OfflineStudyTest, TheStoredRecipeCanBeReadWhileAServerWorks) {
 TEST_F(OfflineStudyTest, ATooLongRecipeIsNotParsed) {
   close();
   const std::string block =
-      study_.table->recipe().SerializeAsString();  // repetitions of it form a valid recipe
+      study_.table->recipe().SerializeAsString();  // repeated, it is still a valid recipe
   std::string bytes;
   while (bytes.size() <= protocol::kMaxFrameBytes) {
     bytes += block;

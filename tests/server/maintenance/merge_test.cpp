@@ -38,7 +38,7 @@ struct Part {
   std::string solver_version = "0.1";
   std::string worker = "host";
   std::vector<std::uint64_t> failed{};
-  double closure = 0.0;  ///< added to `closure` of each result
+  double closure = 0.0;  ///< added to the output `closure` of each result
 };
 
 /// Makes databases and merges them into the database `all`.
@@ -46,7 +46,7 @@ class MergeTest : public StoreFixture {
  protected:
   std::string file(const std::string& name) const { return folder_.file(name + ".db"); }
 
-  /// Adds these studies and results to a database, which it creates if it does not exist.
+  /// Adds these studies and results to a database. Creates the database if it does not exist.
   void make(const std::string& name, const std::vector<Part>& parts) const {
     Store store(file(name));
     for (const Part& part : parts) {
@@ -233,8 +233,8 @@ TEST_F(MergeTest, TheSourceIsNotChangedAndTheStateOfItsStudyIsCopied) {
             "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
-/// Makes the process kill itself when any new connection updates a study. A merge updates a study
-/// after the last row of the study.
+/// Makes this process kill itself when a connection opened later updates a study. Merging updates a
+/// study after storing the last of its rows.
 void kill_when_a_study_is_updated() {
   const auto watch = [](sqlite3* database) {
     sqlite3_update_hook(

@@ -94,7 +94,7 @@ class AccessControlTest : public testing::Test {
   }
   AccessControl control() const { return AccessControl({"127.0.0.1", server_key_, false}); }
   bool refresh(AccessControl& control) { return control.refresh(now_ms_ += 500); }
-  /// Returns the name of the key if it is admitted, otherwise the cause of the refusal.
+  /// Returns the name of the key if the key is admitted, otherwise the cause of the refusal.
   static std::string result_of(const AccessControl& control, const protocol::CurveKey& key,
                                PortRole port = PortRole::kWorkers) {
     const AuthResult result = control.security(port)->authenticate(key);
@@ -216,7 +216,7 @@ PeerAddress peer_address(const std::string& address, int port = 1) {
   return PeerAddress(system_address(address, port));
 }
 
-/// Listens on an address; returns nothing if the machine has no IPv6.
+/// Returns a listener on an address, or nothing if the machine has no IPv6.
 std::optional<Listener> listening(const std::string& address) {
   try {
     return Listener(address, "*");

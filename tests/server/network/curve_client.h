@@ -45,7 +45,7 @@ inline std::string curve_greeting() {
   return bytes.replace(12, 5, "CURVE");
 }
 
-/// Implements the client's side of CURVE (rfc.zeromq.org 26). Tests change its fields to send
+/// Implements the client's side of CURVE (rfc.zeromq.org 26). Tests change the fields to send
 /// messages that no library sends.
 struct CurveClient {
   CurveClient(const protocol::KeyPair& own_keys, const protocol::CurveKey& servers_key)
@@ -61,7 +61,7 @@ struct CurveClient {
   protocol::CurveKey server_short_term{};  // S'
   std::string cookie;
 
-  // Tests set these to forge a wrong vouch.
+  // Tests set these fields to forge a wrong vouch.
   std::optional<protocol::CurveKey> vouched_short_term = {};
   std::optional<protocol::CurveKey> vouched_server = {};
   std::optional<protocol::SecretKey> vouching_secret = {};
@@ -98,7 +98,8 @@ struct CurveClient {
     return data += box(std::string(64, '\0'), curve_nonce("CurveZMQHELLO---", number), server,
                        short_term.secret_key);
   }
-  /// Decrypts the data of WELCOME; returns false if it is not encrypted for this client.
+  /// Decrypts the data of WELCOME and stores the key and the cookie that it contains. Returns false
+  /// if the data is not encrypted for this client.
   bool take_welcome(std::string_view data) {
     const auto text = opened(data.substr(16), curve_nonce("WELCOME-", data.substr(0, 16)), server,
                              short_term.secret_key);

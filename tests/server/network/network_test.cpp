@@ -152,7 +152,8 @@ TEST_F(NetworkTest, PeersTakeTurnsHoweverMuchOneSends) {
   }
   EXPECT_EQ(next().body, "flood");
   RawPeer modest(network_.endpoint(open_));
-  // One packet holds everything, so both messages have arrived when the server answers with READY.
+  // One packet contains the handshake and both messages. So both messages have arrived when the
+  // server answers with READY.
   modest.send(zmtp_greeting() + zmtp_ready("DEALER") + zmtp_frame("first") + zmtp_frame("second"));
   std::size_t received = 0;
   run_until([&] {
@@ -201,7 +202,8 @@ TEST_F(NetworkTest, MessagesSentBeforeADisconnectAreTakenAndTheDisconnectIsRepor
 
 TEST_F(NetworkTest, ManyBytesSentBeforeADisconnectAreTaken) {
   auto leaving = open_peer();
-  // The peer reads all input, because closing a socket with unread input discards its output.
+  // The peer reads all input before it disconnects, because closing a socket with unread input
+  // discards its output.
   std::size_t received = 0;
   run_until([&] {
     received += leaving->receive_available().size();
@@ -336,7 +338,8 @@ TEST_F(TightNetworkTest, TheLongestSilentConnectionIsReplacedUnlessAllAreActive)
   const std::string identity = identity_of(*quiet);
   now_ms_ += 60;
   std::vector<std::unique_ptr<RawPeer>> at_work;
-  // Each peer completes its handshake first, because a new peer replaces unfinished handshakes.
+  // Each peer completes its handshake before the next peer connects, because a new peer replaces a
+  // peer with an unfinished handshake.
   for (int i = 0; i < 3; ++i) {
     at_work.push_back(open_peer());
     identity_of(*at_work.back());
@@ -420,7 +423,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   run_until([&] {
     while (const auto incoming = network_.next(keyed_, any_identity)) {
       bodies.push_back(incoming->body);
-      EXPECT_TRUE(network_.has_more());  // most messages of the flood still wait
+      EXPECT_TRUE(network_.has_more());  // most handshakes of the flood still wait
     }
     return bodies.size() >= 2;
   });
@@ -503,7 +506,8 @@ TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndN
   peers[0]->say_hello();
   take_welcome(*peers[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  const auto silent = keyed_peers(1, kElsewhere);  // takes the place that `second` has left
+  // This peer gets the place that became free when `second` was admitted.
+  const auto silent = keyed_peers(1, kElsewhere);
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(peers[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";
 }

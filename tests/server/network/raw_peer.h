@@ -48,12 +48,12 @@ class RawPeer : public test::RawTcp {
       throw std::runtime_error("the server accepts no more bytes");
     }
   }
-  /// Sends as many bytes as the socket accepts without waiting; returns their number.
+  /// Sends as many bytes as the socket accepts without waiting. Returns the number of sent bytes.
   std::size_t send_what_fits(std::string_view bytes) {
     const ssize_t sent = ::send(number(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return sent < 0 ? 0 : static_cast<std::size_t>(sent);
   }
-  /// Sends as much of `frames` as the socket accepts. The next calls send the rest.
+  /// Sends as much of `frames` as the socket accepts. Later calls send the rest.
   void flood(const std::string& frames) {
     if (left_.empty()) {
       left_ = frames;

@@ -106,7 +106,7 @@ struct Link {
   }
   std::string hello_frame() { return command_frame("HELLO", client.hello()); }
   std::string initiate_frame() { return command_frame("INITIATE", client.initiate()); }
-  /// Expects that the server refuses these bytes with `answer`, which may be empty.
+  /// Expects that the server refuses these bytes and sends `answer`, which may be empty.
   void expect_refused(std::string_view bytes, const std::string& answer = error_frame("500")) {
     EXPECT_EQ(send(bytes), answer);
     EXPECT_THAT(zmtp.fault(), Not(IsEmpty()));
@@ -206,7 +206,7 @@ TEST_F(CurveTest, APeerThatDoesNotHoldItsKeyIsRefusedWhetherOrNotTheKeyIsListed)
 }
 
 TEST_F(CurveTest, KeysOfSmallOrderAreRefused) {
-  // With a public key of small order the shared secret is zero, whatever the other key.
+  // With a public key of small order the shared secret is zero for every secret key.
   for (const std::uint8_t first : {std::uint8_t{0}, std::uint8_t{1}}) {
     Link link = greeted();
     link.client.short_term.public_key = {first};
@@ -287,7 +287,7 @@ TEST_F(CurveTest, AFlippedBitAnywhereInAHandshakeAdmitsNoPeer) {
   for (std::size_t at = 0; at < kGreetingBytes; ++at) {
     Link link = greeted();
     const std::string answers = link.send(flipped(curve_greeting(), at) + link.hello_frame());
-    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // it ignores some bytes
+    EXPECT_EQ(answers.empty(), !link.zmtp.fault().empty()) << at;  // the server ignores some bytes
     EXPECT_FALSE(link.zmtp.is_open()) << at;
   }
   const std::string hello = greeted().hello_frame();
@@ -433,7 +433,7 @@ TEST_F(CurveTest, MessagesOfTheServerHaveCountersThatGrow) {
     std::string_view body = "reply";
     const std::string frame = link.zmtp.begin_message(body);
     EXPECT_THAT(body, IsEmpty());
-    // libzmq takes an outer flag "more" for the encrypted flag, so the outer flags must be 0.
+    // libzmq reads an outer flag "more" as the encrypted flag "more". So the outer flags must be 0.
     EXPECT_EQ(frame[0], 0);
     EXPECT_EQ(link.client.opened_message(frame.substr(2)), std::string("\0reply", 6));
     EXPECT_EQ(number_of(std::string_view(frame).substr(10, 8)), counter);

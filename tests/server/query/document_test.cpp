@@ -18,7 +18,8 @@ namespace {
 
 using Comments = std::map<std::string, std::string>;
 
-/// Returns the comments of columns in CREATE TABLE: on the column's line or on the lines before it.
+/// Returns the comments of columns in CREATE TABLE. A comment is on the line of its column or on
+/// the lines before it.
 Comments comments_of(const std::string& create) {
   static const std::regex kLine("[ \n]*(\\w*)[^\n]*?(?:-- ([^\n]*))?(?:\n|$)");
   Comments comments;
@@ -35,7 +36,7 @@ Comments comments_of(const std::string& create) {
   return comments;
 }
 
-/// Units and meanings of the columns of views that show the lists of a result.
+/// Returns units and meanings of the columns of views that contain a result's lists.
 const Comments& list_columns() {
   static const Comments kColumns{
       {"seq",
@@ -55,7 +56,8 @@ class DocumentTest : public StoreFixture {
  protected:
   DocumentTest() { store(); }
 
-  /// Returns the section on a table or view. `comments` take precedence over `oblique columns`.
+  /// Returns the section on a table or view. It describes each column by its comment in `comments`
+  /// or as `oblique columns` does.
   std::string table_text(const std::string& title, const Comments& comments, bool has_units) const {
     const std::string table = title.substr(0, title.find(' '));
     std::string text =
@@ -85,7 +87,8 @@ class DocumentTest : public StoreFixture {
   }
 };
 
-/// With OBLIQUE_WRITE_TABLES=1 in the environment, this test writes the document instead.
+/// With OBLIQUE_WRITE_TABLES=1 in the environment, this test writes the document and checks
+/// nothing.
 TEST_F(DocumentTest, EveryTableViewAndColumnIsDocumentedAsItsSourceDescribesIt) {
   std::string tables;
   Comments of_results;

@@ -94,7 +94,7 @@ class PlanTest : public StoreFixture {
   PlannedColumn column(const std::string& select) const {
     return plan(database_.get(), question(select)).columns.at(0);
   }
-  /// Returns the error message, which is empty if the query is valid.
+  /// Returns the error message, or an empty text if the query is valid.
   std::string error(const protocol::StudyQuery& query) const {
     try {
       plan(database_.get(), query);
@@ -142,7 +142,7 @@ TEST_F(PlanTest, AStarIsAllColumnsOfTheViewAndTheListsOfSolve) {
   EXPECT_EQ(columns.back().name, "phases[0].t1_s");
 }
 
-/// Returns the axes among the columns that a query shows by default.
+/// Returns the axes among the columns that a study query selects by default.
 std::vector<std::string> usual_axes(const protocol::Recipe& recipe) {
   auto columns = usual_columns(recipe);
   columns.erase(std::find(columns.begin(), columns.end(), "status"), columns.end());
@@ -382,20 +382,20 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
 }
 
 TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedNumbers) {
-  // SQLite 3.40 parses each of these texts as a neighbouring double.
+  // SQLite 3.40 parses each of these texts as a double next to the nearest one.
   for (const char* typed : {"0.1166477", "0.6341252", "0.2611956", "0.863579242346664"}) {
     EXPECT_EQ(number(typed), std::stod(typed));
     EXPECT_EQ(number(std::string("DISTINCT ") + typed), std::stod(typed));
   }
   EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
   EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
-  // The condition holds for one row if both numbers are equal.
+  // If both numbers are equal, the condition selects exactly one row.
   const std::string is_it = "point = 3 AND 0.1166477 = 1166477 / 1e7";
   EXPECT_EQ(number(question("count(*)", "", is_it)), 9.0);
   EXPECT_EQ(number(question("point", "", "", is_it + " DESC")), 3.0);
 }
 
-/// Returns the error message for a condition, which is empty if the condition is allowed.
+/// Returns the error message for a condition, or an empty text if the condition is allowed.
 std::string condition_error(const std::string& text) {
   try {
     check_sql_part("--where", text);

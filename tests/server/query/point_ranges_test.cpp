@@ -1,4 +1,4 @@
-// Tests the ranges of points that conditions give, and compares whole plans with plain SQLite.
+// Tests the ranges of points that conditions select. Compares whole plans with plain SQLite.
 #include "server/query/plan.h"
 
 #include <algorithm>
@@ -107,8 +107,8 @@ class Drawn {
     return recipe;
   }
 
-  /// Returns a condition, mostly a conjunction. Its columns are axes or outputs, and its numbers
-  /// are values of axes or arbitrary.
+  /// Returns a random condition, mostly a conjunction. It compares axes and outputs with values of
+  /// axes and with arbitrary numbers.
   std::string condition(const Recipe& recipe, int depth = 0) {
     const std::size_t kind = depth == 0 && !once_in(4) ? 5 : below(depth < 3 ? 9 : 4);
     const auto inner = [&] { return condition(recipe, depth + 1); };
@@ -132,7 +132,7 @@ class Drawn {
   }
 
  private:
-  /// Makes the block a zip or a sample, or adds an expression or a filter, or leaves it as it is.
+  /// Makes the block a zip or a sample, adds an expression or a filter, or changes nothing.
   void make_unusual(protocol::Block& block) {
     auto& e = *block.mutable_axes(block.axes_size() - 1);
     switch (below(6)) {
@@ -216,7 +216,7 @@ class Drawn {
   std::mt19937 engine_;
 };
 
-/// Returns a study with results. Each fourth study lacks a third of its rows.
+/// Returns a study with results. If `number` is a multiple of 4, a third of the rows is missing.
 std::vector<Change> stored_study(std::uint64_t number, const Recipe& recipe) {
   const Table points = table(recipe);
   AddResults results{number, points, 0, "", "", 1, "now", {}};

@@ -37,11 +37,12 @@ using Kind = QueryReport::Kind;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-/// SQLite compares bytes for hours in this query, without checking for an interrupt.
+/// In this query SQLite compares bytes for hours without checking for an interrupt.
 constexpr const char* kUninterruptible =
     "SELECT instr(zeroblob(16000000), zeroblob(7999999) || x'01')";
 
-/// The result has some megabytes, more than a reader sends before the client takes chunks.
+/// The result of this query has several megabytes. A reader sends less than that before the client
+/// takes chunks.
 constexpr const char* kLong =
     "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 60000) "
     "SELECT i, hex(zeroblob(50)) FROM n";
@@ -63,7 +64,7 @@ class QueryPoolTest : public testing::Test {
   }
   void advance_ms(std::int64_t time_ms) {
     now_ms_ += time_ms;
-    // No query has this number; the call only makes the pool check its clock.
+    // No query has this number. The call only makes the pool read its clock.
     pool().cancel(UINT64_MAX);
   }
   std::uint64_t submit(const std::string& sql, const std::string& client = "") {
@@ -74,7 +75,7 @@ class QueryPoolTest : public testing::Test {
     return last_ticket_;
   }
 
-  /// The reports on a query so far, added up.
+  /// Summary of the reports on one query.
   struct Answer {
     bool runs = false;
     bool ended = false;

@@ -156,7 +156,7 @@ class AnswerTest : public StoreFixture {
  protected:
   AnswerTest() { commit({study_, worker(1), solved(study_, {0, 1, 2, 3, 4, 6, 7, 8, 9})}); }
 
-  /// Limits with which a reader sends only full chunks, even on a slow machine.
+  /// Returns limits without a time limit for chunks, so that a reader sends only full chunks.
   static QueryLimits full_chunks() {
     QueryLimits limits;
     limits.longest_chunk_ms = INT64_MAX;

@@ -1,4 +1,4 @@
-// Tests of left-out points, which workers report and the server completes without a row.
+// Tests of left-out points. Workers report them, and the server completes them without a row.
 #include <memory>
 #include <string>
 #include <vector>
@@ -12,8 +12,7 @@
 namespace oblique::server {
 namespace {
 
-/// Returns a table of `numbers` points with mu from 0 to numbers - 1. Its filter keeps the points
-/// for which `where` is true.
+/// Returns a table of `numbers` points, with mu from 0 to `numbers` - 1 and the filter `where`.
 std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers,
                                                            const std::string& where) {
   return std::make_shared<const protocol::PointTable>(protocol::recipe_of_blocks(
@@ -26,7 +25,7 @@ std::shared_ptr<const protocol::PointTable> filtered_table(std::uint64_t numbers
 /// A filter that keeps every second point.
 constexpr const char* kEven = "floor(mu / 2) == mu / 2";
 
-/// Answers the whole batch, stores the answer and requests another batch. Returns all effects.
+/// Solves the whole batch, stores its results and requests another batch. Returns all effects.
 std::vector<Effect> solve(SchedulerBench& bench, const protocol::PointTable& table,
                           const SendBatch& batch) {
   auto effects = bench.solve_and_store(batch, 1e-3, &table);
@@ -154,7 +153,8 @@ TEST_F(LeftOutPointsTest, PointsAddedByGrowthMayBeLeftOutToo) {
   EXPECT_EQ(bench_.scheduler.study(1).left_out, 58U);
 }
 
-/// Returns the size of the batch that a worker gets after `batches` others that took no time.
+/// Returns the size of the batch that a worker gets after it has solved `batches` others in 1 ms
+/// each.
 std::uint64_t batch_size_after(int batches, const std::string& where) {
   const auto table = filtered_table(1'000'000, where);
   SchedulerBench bench(table, trusting());

@@ -54,7 +54,7 @@ class SchedulerBench {
     return only<SendBatch>(feed(CreditGiven{worker, credit}));
   }
 
-  /// Like `join`, but names the worker's process. Returns all effects.
+  /// Like `join`, but for a worker of the given process. Returns all effects.
   std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
     auto effects = feed(WorkerJoined{worker, 1, process});
     append(effects, feed(CreditGiven{worker, credit}));
@@ -70,7 +70,7 @@ class SchedulerBench {
     return effects;
   }
 
-  /// Returns the message of a worker that solved the whole batch in `busy_s`, except the points
+  /// Returns a worker's results of the whole batch, solved in `busy_s`. The results lack the points
   /// that the filter of `table` leaves out.
   ResultsReceived answer_to(const SendBatch& batch, double busy_s = 1e-3,
                             const protocol::PointTable* table = nullptr) {
@@ -90,7 +90,8 @@ class SchedulerBench {
     return feed(answer_to(batch, busy_s));
   }
 
-  /// Receives results and reports them as durable. Returns the effects of both events.
+  /// Passes results to the scheduler and then reports them as stored. Returns the effects of both
+  /// events.
   std::vector<Effect> store(const ResultsReceived& event) {
     auto effects = feed(event);
     for (const StoreResults& store : only<StoreResults>(effects)) {
@@ -107,8 +108,8 @@ class SchedulerBench {
     return store(answer_to(batch, busy_s, table));
   }
 
-  /// Solves these batches and all that follow, in turn. Returns all batches in the order of
-  /// solving.
+  /// Solves these batches and all batches that follow, one after another. Returns all batches in
+  /// this order.
   std::vector<SendBatch> solve_all(std::vector<SendBatch> batches, double s_per_point = 1e-3,
                                    const protocol::PointTable* table = nullptr) {
     for (std::size_t i = 0; i < batches.size(); ++i) {
@@ -123,7 +124,7 @@ class SchedulerBench {
     return batches;
   }
 
-  /// Solves a batch in `s_per_point` per point. Returns the batch that the worker gets next.
+  /// Solves a batch, taking `s_per_point` for each point. Returns the next batch of the worker.
   SendBatch next_after(const SendBatch& batch, double s_per_point) {
     solve_and_store(batch, s_per_point * static_cast<double>(batch.count()));
     return only<SendBatch>(feed(CreditGiven{batch.worker, 1})).at(0);

@@ -1,4 +1,4 @@
-// Tests of lost workers: they must not cause the failure of harmless points.
+// Tests that the loss of workers does not make harmless points fail.
 #include <algorithm>
 #include <cstdint>
 #include <deque>
@@ -18,7 +18,7 @@
 namespace oblique::server {
 namespace {
 
-/// Makes workers 1, 2 and 3 join, get a batch, and vanish before they have solved a point.
+/// Makes the new workers 1, 2 and 3 join, get a batch, and disappear without solving a point.
 void lose_newcomers(SchedulerBench& bench) {
   for (const WorkerId newcomer : {1U, 2U, 3U}) {
     bench.join(newcomer, 1);
@@ -242,8 +242,8 @@ TEST(WorkerProcesses, TheLatestAbsentProcessesAreKept) {
 
 // ---- Points that kill workers ----
 
-/// Simulates a supervisor that starts a new worker process whenever one dies. Each worker dies of
-/// any batch that contains a harmful point.
+/// Simulates a supervisor that starts a new worker process whenever a process dies. A worker dies
+/// when it solves a batch that contains a harmful point.
 class Supervised {
  public:
   Supervised(SchedulerBench& bench, std::set<std::uint64_t> killers, std::uint32_t prefetch,
@@ -265,7 +265,7 @@ class Supervised {
   bool finished = false;
 
  private:
-  /// Takes the worker's next step; returns false if the worker dies.
+  /// Lets the worker solve its probe or its next batch, or wait. Returns false if the worker dies.
   bool live() {
     if (probe_) {
       take(bench_.solve_probe(*std::exchange(probe_, std::nullopt)));
@@ -332,8 +332,8 @@ TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
     const std::set<std::uint64_t> killers{137, 777};
     Supervised supervised(bench, killers, 3, points.get());
     supervised.run();
-    // Upper bound for each harmful point: two lost workers until it is suspect, four more because
-    // 1000 points are split by eight at most four times, and three when the point is alone.
+    // Each harmful point kills at most nine workers: two until it is suspect, four while the
+    // scheduler divides 1000 points by eight, and three when the point is alone.
     EXPECT_LE(supervised.deaths, 2 * (2 + 4 + 3));
     ASSERT_EQ(supervised.failed.size(), 2U);
     EXPECT_TRUE(supervised.failed.contains(137) && supervised.failed.contains(777));
@@ -344,7 +344,8 @@ TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
 }
 
 TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
-  // No other point can prove that a worker is sound, so each worker gets a probe.
+  // The study has no second point with which a worker could show that it works. So each worker must
+  // first solve an easy point of the probe study.
   SchedulerBench bench(table_of(1));
   Supervised supervised(bench, {0}, 2);
   supervised.run();
@@ -353,10 +354,11 @@ TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
   EXPECT_EQ(supervised.failed.size(), 1U);
 }
 
-/// Provides proven workers, that is workers that have solved a point, and further points.
+/// Provides workers that are proven, because each has solved a point, and further points.
 class SuspectTest : public testing::Test {
  protected:
-  /// Lets each of workers 1 to `workers` solve one point of a study, so that `left` points remain.
+  /// Lets each of the workers 1 to `workers` solve one point of a study. `left` points of the study
+  /// remain open.
   void prove(WorkerId workers, std::uint64_t left) {
     bench_.feed(StudyAdded{1, table_of(workers + left), {}});
     for (WorkerId worker = 1; worker <= workers; ++worker) {
@@ -430,7 +432,7 @@ TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherPointRisky) {
   for (WorkerId worker = 1; worker <= 5; ++worker) {
     bench_.feed(CreditGiven{worker, 2});
     bench_.feed(WorkerUnreachable{worker});
-    // The process reconnects, so the two points stay together.
+    // The same process reconnects, so the scheduler does not separate the two points.
     bench_.join_as(name(worker), worker + 10, 0);
   }
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());

@@ -1,4 +1,4 @@
-// Tests of slow workers: other workers get their points, and nothing counts as lost.
+// Tests of slow workers: other workers get their points, but no worker counts as lost.
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -135,14 +135,15 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
   bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
-  // The limit is ten times the time of eight points side by side on the quick worker.
+  // The quick worker needs 10 s for a point, which makes 80 s for eight points. The limit is ten
+  // times that time.
   bench.pass(780'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-/// Like StallTest, but worker 2 waits for a batch.
+/// Provides the study of StallTest and a worker 2 that waits for a batch.
 class StragglerTest : public StallTest {
  protected:
   StragglerTest() { EXPECT_TRUE(bench_.join(2, 1).empty()); }
@@ -154,7 +155,7 @@ class StragglerTest : public StallTest {
     return batches.at(0);
   }
 
-  /// Receives results of some points of a batch and reports them as durable.
+  /// Passes results of some points of a batch to the scheduler and reports them as stored.
   std::vector<Effect> answer(const SendBatch& batch, const std::vector<std::uint64_t>& points,
                              bool done) {
     ResultsReceived event{batch.worker, batch.study, batch.lease, ++bench_.sequence, done, 0.0, {}};
@@ -180,7 +181,7 @@ TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
   SchedulerBench bench(settings());
   bench.feed(StudyAdded{1, table_of(4), {}});
   bench.join(1, 1);
-  // After three lost new workers, later new workers must solve a probe first.
+  // After three new workers are lost, each later new worker must solve a probe first.
   for (const WorkerId id : {11U, 12U, 13U}) {
     bench.feed(StudyAdded{id, table_of(1), {}});
     bench.join_as("vanishes " + std::to_string(id), id, 1);
@@ -287,7 +288,7 @@ TEST_F(StragglerTest, AHarmfulBatchIsFoundAlthoughTwoWorkersHeldIt) {
   EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty())
       << "the batch was sent to a third worker";
   const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
-  // Two workers are lost, so the points are suspect and need a proven worker.
+  // Two workers are lost. So the points are suspect, and only a proven worker may get them.
   ASSERT_EQ(probe.size(), 1U);
   EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U)
       << "suspect points are sent one by one";

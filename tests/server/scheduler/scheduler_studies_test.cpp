@@ -130,7 +130,7 @@ TEST(SchedulerReuse, AStudyCanBePausedCancelledAndReopenedDuringItsLookup) {
 
 TEST(SchedulerReuse, SuspectPointsAreReusedToo) {
   SchedulerBench bench(table_of(3));
-  // Both workers are lost with all points.
+  // Both workers are lost while they hold all points.
   for (WorkerId worker = 1; worker <= 2; ++worker) {
     bench.join(worker, 4);
     bench.feed(WorkerUnreachable{worker});
@@ -239,7 +239,8 @@ TEST(SchedulerRemovalTest, ResultsThatAreBeingWrittenDuringADeletionAreAcknowled
 
 TEST(SchedulerRemovalTest, LossesOfPointsOfADeletedStudyAreForgotten) {
   SchedulerBench bench(table_of(1));
-  // Six processes are lost with batches, so the scheduler stores losses for points of both studies.
+  // Six processes that hold batches are lost. So the scheduler stores losses for points of both
+  // studies.
   bench.feed(StudyAdded{2, table_of(1000), {}});
   for (WorkerId worker = 1; worker <= 6; ++worker) {
     bench.join_as("process " + std::to_string(worker), worker, 1);

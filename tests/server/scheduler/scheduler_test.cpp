@@ -169,7 +169,8 @@ TEST(SchedulerTest, ABatchThatNeverReachedItsWorkerIsLeasedAgain) {
   SchedulerBench bench(table_of(1));
   const auto batch = bench.join(1, 1).at(0);
   bench.now_ms += 1000;
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());  // the batch may not have arrived
+  // This heartbeat lacks the lease, but the worker may not have received the batch yet.
+  EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {}}).empty());
   bench.pass(3000, {1});
   EXPECT_TRUE(bench.feed(HeartbeatReceived{1, {batch.lease}}).empty());
   bench.feed(HeartbeatReceived{1, {}});
@@ -264,8 +265,8 @@ TEST(SchedulerTest, AReturnedBatchIsFreeAtOnceAndCountsAsNoLoss) {
   SchedulerBench bench(table_of(100), trusting());
   const SendBatch batch = only<SendBatch>(bench.join_as("a", 1, 1)).at(0);
   ASSERT_GT(batch.count(), 1U);
-  bench.join_as("b", 2, 1000);  // gets all other points and waits for more
-  // The worker has solved one point of the batch and returns the others.
+  bench.join_as("b", 2, 1000);  // worker 2 gets all other points and waits for more
+  // Worker 1 has solved one point of its batch and returns the other points.
   bench.feed(ResultsReceived{1, 1, batch.lease, 1, false, 1e-3, {{batch.first_point(), false}}});
   const auto again = only<SendBatch>(bench.feed(BatchesReturned{1, {batch.lease}}));
   std::uint64_t next = batch.first_point() + 1;

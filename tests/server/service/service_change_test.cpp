@@ -133,7 +133,8 @@ TEST_F(ServiceTest, ARefusedChangeHasNoEffectAndTheStateIsStoredAgain) {
     EXPECT_THAT(last_error(), HasSubstr("disk full"));
     EXPECT_EQ(status_of("a").state(), "running");
   }
-  // A refused change may be on the disk and reappear after a crash, so the state is stored again.
+  // A change whose write failed may be on the disk and reappear after a crash. So the state is
+  // stored again, although it has not changed.
   request(change_request("a", protocol::STUDY_CHANGE_RESUME));
   EXPECT_EQ(ports_.jobs.size(), 1U);
   write_all();

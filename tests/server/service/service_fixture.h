@@ -23,7 +23,8 @@ using protocol::ClientRequest;
 using protocol::ServerToWorker;
 using protocol::WorkerMessage;
 
-/// Records everything that the service sends. The test decides how writes, queries and checks end.
+/// Records everything that the service sends. The tests choose the outcomes of writes, queries and
+/// checks.
 class FakePorts final : public Ports {
  public:
   Delivery to_worker(const std::string& identity, const std::string& frame) override {
@@ -96,7 +97,7 @@ class ServiceTest : public testing::Test {
  protected:
   ServiceTest() { start({}); }
 
-  /// Replaces the service by one on a database with these studies.
+  /// Replaces the service by one with these settings and stored studies.
   void start(ServiceSettings settings, std::vector<StoredStudy> studies = {}) {
     settings.solver_version = "1.0";
     settings.database_id = "db";
@@ -146,7 +147,8 @@ class ServiceTest : public testing::Test {
     request(change_request(name, change));
     write_all();
   }
-  /// Answers the last batch and completes the write. Points from `first_failed` on have failed.
+  /// Answers the last batch and completes the write. The points from `first_failed` on are answered
+  /// as failed.
   void answer_batch(std::uint64_t first_failed, const std::string& identity = "worker") {
     const auto batch = last_message().batch();
     WorkerMessage message;
@@ -227,7 +229,8 @@ class ServiceTest : public testing::Test {
     request(message);
     return last_reply().status().studies(0);
   }
-  /// Completes all waiting writes. Writes that can fail end with `error` unless it is empty.
+  /// Completes all waiting writes. If `error` is not empty, writes that can fail end with that
+  /// error.
   void write_all(const std::string& error = {}) {
     for (const WriteJob& job : std::exchange(ports_.jobs, {})) {
       const bool refused = !error.empty() && job.answer_failure;
@@ -237,7 +240,7 @@ class ServiceTest : public testing::Test {
     }
     service_->scheduler().check_invariants();
   }
-  /// Ends the `index`-th query with this reply.
+  /// Ends the `index`-th query with the given reply.
   void answer_query(std::size_t index, const std::string& reply) {
     service_->query_report({QueryReport::Kind::kAnswered, ports_.queries.at(index).ticket, reply});
   }

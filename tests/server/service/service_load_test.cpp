@@ -150,7 +150,7 @@ class WriteLedgerTest : public testing::Test {
     change.message_bytes = bytes;
     ledger_.write(std::move(change), [this](Instant) { outcomes_.emplace_back("results"); });
   }
-  /// Queues a change whose result a client waits for.
+  /// Queues a change. A client waits for its result.
   void write_change() {
     ledger_.write(
         SetStudyState{1, StudyState::kPaused, ""},

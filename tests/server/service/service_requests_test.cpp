@@ -355,7 +355,7 @@ TEST_F(ServiceTraceTest,
   worker_sends_trace(trace);
   EXPECT_EQ(last_reply().trace().trace().result().error(), "it slides for ever");
   EXPECT_EQ(last_reply().trace().trace().states().size(), 0U);
-  // The reply for a trace that is too long contains the value of `every` that would fit.
+  // If a trace is too long, the reply contains a value of `every` with which it would fit.
   request_trace(9, 3);
   trace = trace_of(orders()[1], "");
   trace.set_instants(1'000'000);
@@ -494,7 +494,7 @@ TEST_F(ServiceTraceTest, AnInvalidTraceFailsTheRequestAndNothingElse) {
                 trace.clear_states();
               }),
               HasSubstr("no rows"));
-  worker_sends_trace(trace_of({}, ""));  // a trace without an order is ignored
+  worker_sends_trace(trace_of({}, ""));  // ignored, because it was not ordered
   request_trace(99, 60);
   worker_sends_trace(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());

@@ -35,7 +35,7 @@ class ServiceReuseTest : public ServiceTest {
     message.mutable_submit()->set_no_reuse(false);
     return message;
   }
-  /// Returns the submission of `reusing` with ten more points.
+  /// Returns the same submission as `reusing`, with ten more points.
   ClientRequest grown_request(const std::string& name, std::uint64_t points = 10) {
     ClientRequest message = reusing(name, points);
     *message.mutable_submit()->mutable_recipe()->add_blocks() = table_of(10)->recipe().blocks(0);
@@ -47,7 +47,7 @@ class ServiceReuseTest : public ServiceTest {
     request(reusing("b"));
     write_all();
   }
-  /// Returns the first point of each reuse of results that waits for the writer.
+  /// Returns the first point of each ReuseResults that waits for the writer.
   std::vector<std::uint64_t> parts() const {
     std::vector<std::uint64_t> firsts;
     for (const WriteJob& job : ports_.jobs) {
@@ -66,7 +66,7 @@ class ServiceReuseTest : public ServiceTest {
     }
     return 0;
   }
-  /// Completes all waiting writes. A waiting reuse of results has this outcome.
+  /// Completes all waiting writes. Each ReuseResults among them gets this outcome.
   void write_part(const ReusedResults& outcome) {
     for (WriteJob& job : ports_.jobs) {
       if (const auto* part = std::get_if<ReuseResults>(&job.change)) {
@@ -279,8 +279,9 @@ TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
 
 TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
   submit_filtered();
-  // From the fourth worker on the batch is a probe, because three new workers were lost. Therefore
-  // ranges that are wrong only for batches of the study come first.
+  // Each invalid range ends the connection of a new worker. After three lost workers, a new worker
+  // gets a probe instead of a batch of the study. So ranges that are invalid only for batches of
+  // the study come first.
   const std::vector<std::vector<std::uint64_t>> wrong{
       {0, 12}, {11, 1}, {0}, {0, 0}, {3, ~std::uint64_t{0}}, {~std::uint64_t{0}, 2}, {0, 1, 5}};
   for (const auto& numbers : wrong) {

@@ -36,7 +36,7 @@ TEST_F(CompletedRangesTest,
   EXPECT_THAT(ranges(), ElementsAre("0+9"));
   commit({ForgetFailures{1, IntervalSet(4, 7), "now"}});
   EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3")) << "only failures are forgotten";
-  // One transaction may store a failure and delete it again.
+  // One transaction may store a failure and also delete it.
   commit({failed(study, {4}), ForgetFailures{1, IntervalSet(4, 5), "now"}});
   EXPECT_THAT(ranges(), ElementsAre("0+4", "6+3"));
   EXPECT_THAT(rows("SELECT counted FROM studies"), ElementsAre("1"));

@@ -157,7 +157,7 @@ TEST_F(ResultReuseTest, AModelWithoutRowsCostsOneProbe) {
 
 // ---- Random studies, compared with a lookup in a map --------------------------------------------
 
-/// Returns a block with few values per key, so that many points occur several times.
+/// Returns a block with few values per axis, so that many points occur several times.
 protocol::Block random_block(std::mt19937& random) {
   const auto pick = [&](const std::string& key, std::vector<double> values) {
     std::shuffle(values.begin(), values.end(), random);
@@ -201,13 +201,13 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
 
 TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
   std::mt19937 random(4711);
-  std::map<Inputs, std::string> solved;  // first row with these inputs, as in `reused_from`
+  std::map<Inputs, std::string> solved;  // first row with these inputs, written as in `reused_from`
   std::size_t reused = 0;
   std::size_t open = 0;
   for (std::uint64_t study = 1; study <= 60; ++study) {
     const Table points = random_table(random);
     add(study, "study " + std::to_string(study), points);
-    // Some points have failed or were solved by another version; their rows are not replaced.
+    // Some points have failed or were solved by another version. Reuse must not replace their rows.
     const AddStudy added = study_of(points, study);
     AddResults own = results_of(added, {}, kWorker);
     AddResults old = results_of(added, {}, kOldWorker);
@@ -233,8 +233,8 @@ TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
     EXPECT_EQ(copies(study), expected) << "study " << study;
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
-    // Solves some of the other points. A copy is never a source, because its own source comes
-    // first.
+    // Solves some of the points that are still open. `solved` does not get copied rows, because a
+    // row is always copied from its first source.
     AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {

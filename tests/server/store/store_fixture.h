@@ -26,14 +26,14 @@ inline Table table(const protocol::Recipe& recipe) {
   return std::make_shared<const protocol::PointTable>(recipe);
 }
 
-/// Returns ten points with mu from 0 to 1, of which a filter leaves out some.
+/// Returns ten points with mu from 0 to 1 and the filter `where`.
 inline Table filtered_table(const std::string& where) {
   protocol::Recipe recipe = table_of(10)->recipe();
   recipe.mutable_blocks(0)->set_where(where);
   return table(recipe);
 }
 
-/// Returns ten points followed by ten more.
+/// Returns the ten points of `table_of(10)` twice.
 inline Table grown_table() {
   protocol::Recipe recipe = table_of(10)->recipe();
   *recipe.add_blocks() = recipe.blocks(0);
@@ -47,7 +47,7 @@ inline std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end
   return found;
 }
 
-/// Provides a database in a folder of its own. Tests can also access the file like another program.
+/// Provides a database in its own folder. Tests can also access the file as another program would.
 class StoreFixture : public testing::Test {
  protected:
   static AddStudy study_of(Table points, std::uint64_t id = 1, const std::string& name = "a") {
@@ -96,7 +96,7 @@ class StoreFixture : public testing::Test {
   void commit(const std::vector<Change>& changes) { store().commit(changes); }
   void close() { store_.reset(); }
 
-  /// Runs SQL on a connection of its own, like another program.
+  /// Runs SQL on a separate connection, as another program would.
   void execute_sql(const std::string& sql) const { execute_sql(path_, sql); }
   static void execute_sql(const std::string& path, const std::string& sql) {
     execute(open_database(path, SQLITE_OPEN_READWRITE).get(), sql);
@@ -121,7 +121,7 @@ class StoreFixture : public testing::Test {
   /// Returns the faults that a check of the whole file finds.
   std::vector<std::string> faults() const { return faults(path_); }
   static std::vector<std::string> faults(const std::string& path) { return diagnose(path).faults; }
-  /// Returns why the database cannot be opened.
+  /// Returns the error message of opening the database.
   std::string refusal() const {
     try {
       Store opened(path_);

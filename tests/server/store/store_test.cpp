@@ -113,7 +113,7 @@ StudyTable table_of_models(std::uint64_t models, std::uint64_t points) {
 
 TEST_F(StoreTest, EachResultHasItsOwnModelInWhateverMessageOrStudyItComes) {
   const AddStudy first{1, "a", table_of_models(11, 2), "now"};
-  // 11 of its 101 models occur in study 1, too
+  // Study 2 has 101 models, of which 11 also occur in study 1.
   const AddStudy second{2, "b", table_of_models(101, 2), "now"};
   commit({first, second, worker(1)});
   commit({solved(first, {8, 0, 2, 4, 6, 10})});
@@ -371,7 +371,7 @@ TEST_F(StudyDeletionTest, DeletionWaitsWhileAReaderKeepsTheLogLong) {
 
 // ---- Tables, views and triggers -----------------------------------------------------------------
 
-/// Provides a database with three solved points. The tests change it like another program.
+/// Provides a database with three solved points. The tests change it as another program would.
 class SchemaTest : public StoreFixture {
  protected:
   SchemaTest() {
@@ -433,7 +433,7 @@ class StoreFilesTest : public StoreFixture {
   static std::int64_t rows_of(const std::string& path) {
     return std::stoll(rows(path, "SELECT count(*) FROM results").at(0));
   }
-  /// Returns the number of rows in the database file alone, without its log.
+  /// Returns the number of rows in a copy of the database file without its log.
   std::int64_t rows_of_copy(const std::string& name) {
     fs::copy_file(path_, folder_.file(name));
     return rows_of(folder_.file(name));

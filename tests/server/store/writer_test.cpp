@@ -25,7 +25,7 @@ using testing::IsEmpty;
 using testing::UnorderedElementsAre;
 using Kind = WriteReport::Kind;
 
-/// A storage that fails when a test wants it to.
+/// A storage whose operations fail on request.
 class TestStorage final : public Storage {
  public:
   void commit(std::span<const Change> changes) override {

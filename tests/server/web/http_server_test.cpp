@@ -58,7 +58,7 @@ class EchoServer {
   /// Returns the number of pending answers and streams.
   long in_progress() const { return token_.use_count() - 1; }
   static constexpr std::size_t kLargeBytes = 50'000'000;  // more than socket buffers hold
-  /// Wakes the server again and again, as its owner does, until `count` answers are pending.
+  /// Wakes the server repeatedly, as its owner does, until `count` answers and streams are pending.
   void wake_until_in_progress(long count) {
     while (in_progress() != count) {
       server_.wake();
@@ -97,7 +97,8 @@ class EchoServer {
   HttpServer server_;  // the last member, because its thread uses the others
 };
 
-/// Returns a peer that has requested a path. For a stream or /large it has read the answer's head.
+/// Returns a peer that has requested a path. The peer has read the answer's head if the path is a
+/// stream or /large.
 std::unique_ptr<RawHttp> begin(const EchoServer& server, const std::string& path) {
   auto peer = std::make_unique<RawHttp>(server.url());
   peer->send("GET " + path + kEnd);
@@ -419,7 +420,7 @@ void expect_statuses(const std::vector<RequestRow>& rows) {
 
 TEST(RequestRules, RefuseOtherMethodsAndBodiesWithoutALimit) {
   expect_statuses({
-      {"GET", "/", {}, 200},  // as in HTTP/1.0; browsers always send Host
+      {"GET", "/", {}, 200},  // Host may be missing, as in HTTP/1.0
       {"HEAD", "/", {kHost}, 200},
       {"GET", "/", {kHost, kHost}, 400},
       {"GET", "/", {kHost, {"host", "evil.example"}}, 400},
@@ -449,7 +450,7 @@ TEST(RequestRules, RefuseRequestsOfOtherSites) {
       {"POST", "/", {kOrigin}, 403},
       {"GET", "/", {kHost, kOrigin}, 200},
       {"GET", "/", {kHost, same}, 200},
-      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // for an address typed by the user
+      {"GET", "/", {kHost, {"sec-fetch-site", "none"}}, 200},  // the user typed the address
   });
   for (const std::string other : {"http://evil.example", "https://localhost:7602", "null",
                                   "http://localhost", "http://localhost:7603", ""}) {

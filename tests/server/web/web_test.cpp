@@ -139,7 +139,7 @@ TEST(Snapshot, WantsThreadsForOpenPointsOnly) {
   Snapshot snapshot;
   EXPECT_EQ(snapshot.threads_wanted(), 0U);
   snapshot.points_open = 1'000'000'000;
-  EXPECT_EQ(snapshot.threads_wanted(), 1U);  // one thread while the time per point is unknown
+  EXPECT_EQ(snapshot.threads_wanted(), 1U);  // one thread, because the time per point is unknown
   snapshot.thread_s_per_point = 1e-9;
   EXPECT_EQ(snapshot.threads_wanted(), 1U);
   snapshot.thread_s_per_point = 6e-3;
@@ -152,7 +152,7 @@ TEST(Snapshot, WantsThreadsForOpenPointsOnly) {
 
 struct Metrics {
   std::map<std::string, std::string> types;
-  std::map<std::string, double> values;  ///< keys are names with labels, as printed
+  std::map<std::string, double> values;  ///< the keys are printed names with labels
 };
 
 Metrics parse(const std::string& text) {
@@ -255,7 +255,7 @@ TEST(Web, ReportsThatTheServerStartsBeforeTheLoopRuns) {
 
 class WebTest : public testing::Test {
  protected:
-  /// Returns the answer as soon as the server has started.
+  /// Waits until the server has started; then returns its answer.
   std::string get_started(const std::string& path) const {
     std::string answer = get(server_.http_url(), path);
     while (body_of(answer) == "the server is starting\n") {

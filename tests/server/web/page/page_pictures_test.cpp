@@ -101,7 +101,7 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyOpenOnes) {
                      {{protocol::range("H", 0.1, 1.0, 40), protocol::range("mu", 0.0, 2.0, 40),
                        protocol::range("e", 0.5, 1.0, 40)}}));
   solve(200);
-  std::set<std::uint64_t> solved;  // includes all points of each batch
+  std::set<std::uint64_t> solved;  // more than 200, because batches are solved completely
   const json stored = page_.json("/api/studies/1/rows?select=point&limit=64000");
   for (const json& row : stored["rows"]) {
     solved.insert(row[0].get<std::uint64_t>());
@@ -239,7 +239,7 @@ TEST_F(PageStudyTest, AConditionFollowsTheQueryLanguage) {
     }
     EXPECT_EQ(page_.status("/api/studies/9/" + picture + "&where=1"), 404);
   }
-  // A wrong output is an error, too, although the condition is valid.
+  // An unknown output is an error even if the condition is valid.
   EXPECT_EQ(page_.status("/api/studies/1/slice?z=muu&x=mu&where=1"), 400);
   EXPECT_EQ(page_.status("/api/studies/1/bins?x=mode&where=1"), 400);
 }

@@ -75,7 +75,7 @@ class PageServer {
   /// Sends a request with the cookie that the page received.
   std::string get(const std::string& path) const { return request("GET", path, cookie_header()); }
   int status(const std::string& path) const { return status_of_answer(get(path)); }
-  /// Sends a request; the caller reads the answer.
+  /// Sends a request. The caller must read the answer.
   std::unique_ptr<RawHttp> begin(const std::string& path) const {
     auto browser = std::make_unique<RawHttp>(url());
     browser->send("GET " + path + " HTTP/1.1\r\nHost: " + host() + "\r\n" + cookie_header() +

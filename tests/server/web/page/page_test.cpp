@@ -1,4 +1,4 @@
-// Tests of access to the page and of its requests, except for pictures, with a whole server.
+// Tests of access to the page, and of its requests except for pictures, with a whole server.
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -218,7 +218,7 @@ std::string body_with(const std::string& H, const std::string& others = "",
          R"(},{"key":"e","values":[1]}],"where":")" + where + R"("}]}})";
 }
 
-/// Maps the value of a member to the element of a JSON array that has this value.
+/// Returns the elements of a JSON array, each under the value of its member `member`.
 std::map<std::string, json> named(const json& list, const char* member) {
   std::map<std::string, json> found;
   for (const json& element : list) {

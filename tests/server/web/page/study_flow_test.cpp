@@ -23,7 +23,7 @@ using protocol::ClientRequest;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-/// Runs some queries and answers with the points that their rows contain.
+/// An answer that runs `queries` queries and then lists the points in their rows.
 class Points : public StudyAnswer {
  public:
   explicit Points(int queries = 1, const std::string& condition = {})
@@ -85,7 +85,7 @@ class StudyFlowTest : public testing::Test {
     EXPECT_EQ(requests.at(0).describe().study(), "a");
     reply(requests.at(0).request_id(), described);
   }
-  /// Returns a pending answer whose first query is sent.
+  /// Returns a pending answer. Its first query has been sent.
   PendingAnswer described(int queries = 1, const std::string& condition = {}) {
     PendingAnswer pending = study_flow(client_, 1, std::make_unique<Points>(queries, condition));
     describe(pending);

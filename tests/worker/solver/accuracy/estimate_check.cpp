@@ -1,4 +1,4 @@
-// Measures how accurate estimated errors are. Solves random points with estimates, and again on a
+// Measures how accurate estimated errors are. Solves random points with estimates, and then on a
 // mesh so fine that its results count as exact.
 #include <algorithm>
 #include <array>
@@ -85,7 +85,7 @@ Results solve(const ModelParameters& model, const std::vector<solver::Point>& po
   return results;
 }
 
-/// An output: its estimated error, and the difference of two results in the same unit.
+/// An output: its estimated error, and its difference between two results in the same unit.
 struct Output {
   std::string_view name;
   std::optional<double> ErrorEstimate::*estimate;
@@ -126,7 +126,7 @@ constexpr std::array kOutputs{
                     std::hypot(a.vt_in_m_s, a.vn_in_m_s);
            }}};
 
-/// Errors below this number are due to rounding.
+/// Errors below this value are due to rounding.
 constexpr double kRounding = 1e-9;
 
 double quantile(std::vector<double> values, double fraction) {
@@ -164,7 +164,7 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
 
 void print_modes(const Results& results, const Results& truth,
                  const std::vector<ErrorEstimate>& errors) {
-  std::array<std::array<int, 2>, 2> count{};  // [companion agrees][exact result agrees]
+  std::array<std::array<int, 2>, 2> count{};  // points by [companion agrees][exact result agrees]
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
       const bool right = results[i]->major_mode == truth[i]->major_mode;
@@ -208,7 +208,7 @@ void check(const Settings& settings) {
   const auto points = random_points(settings);
   ModelParameters finest = model_of(settings, settings.truth);
   finest.step_factor = 0.5;
-  finest.integrator = solver::Integrator::kExplicit;  // much faster and equally accurate
+  finest.integrator = solver::Integrator::kExplicit;  // faster, and equally accurate
   const Results truth = solve(finest, points);
   for (const int mesh : settings.meshes) {
     check_mesh(model_of(settings, mesh), points, truth);

@@ -100,8 +100,7 @@ TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheCoarserMeshDoesNot
   };
   EXPECT_NEAR(error(16, far) / error(16, near), 2.0, 1e-9);
   EXPECT_GT(error(4, near), 5.0 * error(16, near));
-  // With resolved waves the error is d/3 (order 2), where d is the difference from the coarser
-  // mesh.
+  // If both meshes resolve the waves, the error is a third of their difference (order 2).
   EXPECT_NEAR(error(64, near), 0.01 / 3.0, 1e-5);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), near).mode_same, 1);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), far).mode_same, 0);
@@ -164,7 +163,8 @@ TEST(EstimatedErrors, TwiceTheEstimateBoundsTheDifferenceToAFinerMesh) {
 
 using Outcomes = std::map<std::uint64_t, Outcome>;
 
-/// Returns outcomes by point number. Expects that each point is requested and answered once.
+/// Returns the outcomes by point number. Expects that each point is requested and answered exactly
+/// once.
 Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& falls) {
   Outcomes outcomes;
   std::size_t next = 0;
@@ -177,8 +177,8 @@ Outcomes solved_with_errors(const std::vector<FingerPoint>& points, FallCache& f
   return outcomes;
 }
 
-/// Returns points of several models with two elements per link, more than are solved together. No
-/// model reaches H = 1.1999 m.
+/// Returns points of several models with two elements per link. The points are too many to be
+/// solved together. No model reaches H = 1.1999 m.
 std::vector<FingerPoint> solvable_and_other_points() {
   std::vector<ModelParameters> models(3, coarse_model(2));
   models[1].k_N_m *= 0.5;

@@ -14,12 +14,12 @@ namespace oblique::solver {
 namespace {
 
 struct Errors {
-  double relative = 0.0;  ///< largest error of peaks, duration and slide
+  double relative = 0.0;  ///< largest relative error of peaks, duration and slide
   double stick_s = 0.0;
   double exit_m_s = 0.0;
 };
 
-/// Compares contacts after the same fall with contacts whose steps are six times shorter.
+/// Solves contacts after one fall. Compares them with contacts whose steps are six times shorter.
 class Steps {
  public:
   explicit Steps(const ModelParameters& model)
@@ -29,7 +29,7 @@ class Steps {
     reference_ = solved(shorter);
   }
 
-  /// Returns the largest errors with steps of `factor` times the chosen length.
+  /// Returns the largest errors with steps `factor` times as long as the chosen steps.
   Errors left_by(double factor) const {
     ModelParameters stepped = model_;
     stepped.step_factor = factor;

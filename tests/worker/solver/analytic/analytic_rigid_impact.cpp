@@ -121,7 +121,8 @@ RigidImpact::Ending RigidImpact::end_of(const Motion& motion) const {
   const double step_s = motion.shortest_period_s() / kSamplesPerPeriod;
   std::vector<double> before;
   for (const Watch& watch : watches) {
-    // A function that starts at zero, up to rounding, counts only after it has been negative.
+    // A function that is zero at the start, up to rounding, can end the regime only after it has
+    // been negative.
     const double scale = watch.end == End::kSeparation || watch.end == End::kSlip
                              ? p_.V0_m_s.norm() * std::sqrt(p_.k_N_m / p_.W_per_kg(1, 1))
                              : p_.V0_m_s.norm();

@@ -8,8 +8,8 @@ namespace oblique::solver {
 
 /// Closed form of a rigid body that strikes the ground through the local compliant contact
 /// (Stronge, Impact Mechanics). The inverse mass W at the tip, symmetric and positive definite,
-/// describes the body: d(V_t, V_n)/dt = W (F_t, F_n). In each regime the force is F_0 - K r, where
-/// r is the displacement of the tip since the regime began, so that
+/// describes the body: d(V_t, V_n)/dt = W (F_t, F_n). Let r be the displacement of the tip since
+/// the regime began. In each regime the force is F_0 - K r, so that
 ///
 ///   r'' = W F_0 - W K r,
 ///   K = diag(k/eta2, k_n) in stick, with the rows (0, -s mu k_n) and (0, k_n) in slip.
@@ -70,7 +70,7 @@ class RigidImpact {
   enum class End { kSeparation, kTurn, kSlip, kStick };
   struct Ending {
     End end;
-    double t_s;  ///< since the start of the regime
+    double t_s;  ///< time from the start of the regime
     double s;    ///< direction in which P slides after kSlip
   };
 

@@ -61,7 +61,7 @@ RigidImpact::Parameters impact(double W_tt, double W_tn, double W_nn) {
 }
 
 TEST(RigidImpact, BallThatSlidesThroughoutIsABilinearOscillator) {
-  // W is that of a free particle, 1/m without coupling.
+  // The body is a free particle: W is 1/m, without coupling.
   const RigidImpact ball(impact(0.5, 0.0, 0.5));
   const double omega = std::sqrt(1e6 * 0.5);
   EXPECT_EQ(ball.mode(), "sC sR");

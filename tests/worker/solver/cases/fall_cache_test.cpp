@@ -54,7 +54,7 @@ struct CountedFalls {
   FallCache cache;
 };
 
-/// Memory for `falls` falls of coarse_model() and half a fall more.
+/// Returns the memory of `falls` falls of coarse_model(), plus half a fall.
 std::size_t bytes_of(std::size_t falls) {
   static const std::size_t bytes =
       solve_falls(std::vector{coarse_model()}).front().fallen->fall().bytes();

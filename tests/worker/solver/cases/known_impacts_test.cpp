@@ -12,13 +12,14 @@
 namespace oblique::solver {
 namespace {
 
-/// Relative error that the default step may cause, in addition to the rounding of the known value.
+/// Relative error allowed for the default step, in addition to the rounding of the known value.
 constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
 constexpr double kTimeDigit_us = 0.0005;
 constexpr double kStickDigit_us = 0.005;
-/// Allowed errors of duration and stick, then of phases, relative to the duration. Minima of the
-/// force are flat, so the default tolerance of 1e-5 moves the instant of a turn by up to 3.5 ns.
+/// Allowed errors relative to the duration: first of duration and stick, then of the ends of
+/// phases. Minima of the force are flat. So the default tolerance of 1e-5 moves the end of a phase
+/// by up to 3.5 ns.
 constexpr double kRelativeTime = 3e-6;
 constexpr double kRelativeInstant = 6e-6;
 constexpr double kSlideDigit_mm = 0.000005;

@@ -10,7 +10,7 @@
 namespace oblique::solver {
 namespace {
 
-/// Two coefficients of friction between which the mode changes, and the critical events at them.
+/// Two coefficients of friction between which the mode changes, and the critical event at each.
 struct Change {
   double H_m;
   double e_star;
@@ -52,7 +52,7 @@ TEST(Margin, FallsLinearlyToZeroOnBothSidesOfAChangeOfMode) {
       const CaseResult far = solved(change, mu * (1.0 + side * 2.0 * kNear));
       EXPECT_EQ(*near.margin_event, side < 0.0 ? change.below : change.above);
       EXPECT_EQ(*far.margin_event, *near.margin_event);
-      // The margin is of the order of the relative difference in mu.
+      // The margin has the order of magnitude of the relative distance between mu and the change.
       EXPECT_GT(*near.margin, 0.03 * kNear);
       EXPECT_LT(*near.margin, 3.0 * kNear);
       EXPECT_NEAR(*far.margin / *near.margin, 2.0, 0.2);

@@ -16,7 +16,8 @@ TEST(Impact, AVeryHeavyTipBouncesLikeItsMassAlone) {
   ModelParameters model = coarse_model();
   model.tip_mass_kg = kMass_kg;
   const CaseResult result = Finger{model}.solve(0.3, 0.0, 1.0);
-  // The contact lasts half a period on the spring, within one percent due to gravity and links.
+  // The contact lasts half a period of the mass on the spring. Gravity and the links change this
+  // time by at most one percent.
   EXPECT_NEAR(result.duration_s, M_PI * std::sqrt(kMass_kg / model.k_N_m),
               0.03 * result.duration_s);
   EXPECT_NEAR(result.fn_peak_N, -result.vn_in_m_s * std::sqrt(kMass_kg * model.k_N_m),
@@ -38,8 +39,8 @@ TEST(Impact, WithoutHysteresisRestitutionLosesNoEnergy) {
 }
 
 TEST(Impact, TheLossInRestitutionIsTheSumOverAllCyclesBetweenTurns) {
-  // Compression from F_a to F_b along the slope k takes (F_b^2 - F_a^2)/2k. Restitution along the
-  // slope k/e*^2 returns e*^2 times that energy.
+  // Compression from F_a to F_b on a line of slope k takes the energy (F_b^2 - F_a^2)/2k.
+  // Restitution on a line of slope k/e*^2 returns e*^2 times that energy.
   const double e_star = 0.7;
   const CaseResult result = paper_finger().solve(1.0, 0.4, e_star);
   ASSERT_EQ(result.peaks.size(), 3U);
@@ -105,7 +106,8 @@ void expect_physical(const CaseResult& r, double worst_closure) {
   EXPECT_LT(r.energy.closure, worst_closure);
 }
 
-/// Expects alternating phases that fill the contact, peaks between phases, and stick inside.
+/// Expects that phases alternate and fill the contact, that peaks are between phases, and that
+/// stick is inside the contact.
 void expect_in_order(const CaseResult& r) {
   ASSERT_EQ(r.phases.size(), 2 * r.peaks.size());
   double t_s = 0.0;
@@ -136,8 +138,8 @@ void expect_in_order(const CaseResult& r) {
   EXPECT_EQ(r.mode.back(), 'R');
 }
 
-/// Returns a random point; in one of six points one value is extreme. H stays below the largest
-/// drop, at which the tip has no speed.
+/// Returns a random point. In one of six points, one value is extreme. H stays below the largest
+/// drop, because the tip has no speed there.
 Point random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);

@@ -47,7 +47,7 @@ TEST(Trace, BeginsAtTouchWithoutForcesAndEndsAtSeparation) {
     EXPECT_EQ(first.state[1], 'C');
     const TraceRow& last = t.rows.back();
     EXPECT_EQ(last.t_s, t.result.duration_s);
-    // The tolerance is the change of the restitution spring's force in 1e-13 s.
+    // The tolerance is the amount by which the force of the restitution spring changes in 1e-13 s.
     const double fn_N = kLocated_s * coarse_finger().model().k_N_m * std::abs(last.vn_m_s) /
                         (t.result.e_star * t.result.e_star);
     EXPECT_NEAR(last.fn_N, 0.0, fn_N);
@@ -66,7 +66,8 @@ TEST(Trace, ForcesStayInsideTheFrictionConeAndOnItInSlip) {
       EXPECT_LE(std::abs(row.ft_N), limit_N + 1e-6);
       if (row.state[0] == 's') {
         EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
-        // P stops at an instant exact to 1e-13 s. With 1e4 N and 1e4 m/s^2 this allows 1e-5 W.
+        // The instant at which P stops has an error of up to 1e-13 s. With 1e4 N and 1e4 m/s^2 this
+        // allows 1e-5 W.
         EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction opposes the motion of P";
       }
     }
@@ -81,7 +82,8 @@ TEST(Trace, ForcesFollowFromDeformationsAndPositions) {
       EXPECT_NEAR(row.xP_m, row.x_m - row.ux_m, 1e-15);
       EXPECT_NEAR(row.uy_m, row.y_m + t.result.H_m, 1e-15);
     }
-    // Until the first turn the normal force is the force of the compression spring.
+    // Until the end of the first compression the normal force is the force of the compression
+    // spring.
     for (const TraceRow& row : t.rows) {
       if (row.state[1] == 'R') {
         break;
@@ -101,7 +103,8 @@ TEST(Trace, PIsAtRestInStickAndMovesWithItsVelocityInSlip) {
       const TraceRow& b = t.rows[i];
       slide_m += std::abs(b.xP_m - a.xP_m);
       if (a.state[0] == 'S') {
-        // The start of sliding is exact to 1e-13 s, in which P moves by at most `end_m`.
+        // The start of sliding has an error of up to 1e-13 s. In this time P moves by at most
+        // `end_m`.
         const double end_m = kLocated_s * (std::abs(b.vt_m_s) + cone * std::abs(b.vn_m_s));
         EXPECT_NEAR(b.xP_m, a.xP_m, b.state[0] == 'S' ? 1e-15 : end_m);
         EXPECT_EQ(a.vP_m_s, 0.0);
@@ -135,8 +138,8 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
   }
   for (const Traced& t : many) {
     SCOPED_TRACE(t.result.mode);
-    // Keeps rows at distinct instants, so that the two rows of an event count once. The force
-    // changes by 1e-4 N in 1e-11 s.
+    // Keeps rows at distinct instants, so that the two rows of an event count once. Between
+    // instants that count as equal, less than 1e-11 s apart, the force changes by at most 1e-4 N.
     std::vector<TraceRow> rows;
     for (const TraceRow& row : t.rows) {
       if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
@@ -245,8 +248,8 @@ TEST(Trace, PeaksOfTheReactionsAgreeWithTheRows) {
         largest_N = std::max(
             largest_N, std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
       }
-      // A peak between two rows can exceed them by the fraction (omega h)^2/8 of the fastest
-      // vibration, which is a large part of the reaction with one element per link.
+      // A peak between two rows can exceed them by (omega h)^2/8 times the fastest vibration. With
+      // one element per link, this vibration is a large part of the reaction.
       EXPECT_GT(t.result.reaction_peaks[joint].force_N, 0.998 * largest_N);
       EXPECT_LT(t.result.reaction_peaks[joint].force_N, 1.02 * largest_N);
     }

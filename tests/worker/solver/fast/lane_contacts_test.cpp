@@ -57,7 +57,8 @@ std::map<std::uint64_t, Outcome> solved(
   return outcomes;
 }
 
-/// Returns models whose chains differ but have one shape. The last and the first differ in k only.
+/// Returns models whose chains differ but have one shape. The last model differs from the first
+/// only in k.
 const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
   static const auto all = [] {
     std::vector<ModelParameters> models(5, coarse_model());
@@ -70,7 +71,7 @@ const std::vector<std::unique_ptr<Coarse>>& unlike_models() {
     models[4].k_N_m *= 0.7;  // its chain equals that of the first model
     std::vector<std::unique_ptr<Coarse>> list;
     for (const ModelParameters& model : models) {
-      list.emplace_back(new Coarse{model});  // not movable: members point to each other
+      list.emplace_back(new Coarse{model});  // not movable, because members point to each other
     }
     return list;
   }();

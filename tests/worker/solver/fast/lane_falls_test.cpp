@@ -105,7 +105,7 @@ TEST(CollocationFall, AgreesWithSmallStepsForSoftStiffLoadedAndSingleLinks) {
   ModelParameters soft = model_of(2);
   soft.E_Pa *= 1e-4;
   ModelParameters softest = model_of(2);
-  softest.E_Pa *= 1e-5;  // so soft that each link sags and swings
+  softest.E_Pa *= 1e-5;  // links so soft that they sag and swing
   ModelParameters stiff = model_of(2);
   stiff.E_Pa *= 100.0;
   ModelParameters loaded = model_of(2);

@@ -148,8 +148,8 @@ TEST(LaneStepper, AgreesWithTheReferenceToRounding) {
         const auto actual = steps.of(kernel.lanes - 1, last);
         for (std::size_t i = 0; i < expected.size(); ++i) {
           // The acceleration of a slope has a rounding error of about 2e-16 E/(rho l^3), which is
-          // 4e-4 1/s^2 at l = 25 mm. In the 2 us of these steps it changes rates, which are of
-          // order 1, by 1e-9.
+          // 4e-4 1/s^2 at l = 25 mm. In the 2 us of these steps, this error changes rates by 1e-9.
+          // Rates are of order 1.
           EXPECT_NEAR(actual[i], expected[i], 1e-8 * std::max(1.0, std::abs(expected[i]))) << i;
         }
       }

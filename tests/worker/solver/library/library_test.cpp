@@ -93,7 +93,7 @@ TEST(LibraryTest, APointOfAnUnknownModelIsRefused) {
   EXPECT_THROW(outcomes_of({coarse_model()}, {{1, {1.0, 0.4, 1.0}}}), InputError);
 }
 
-/// Returns a model whose fall takes hours, so that a test that waits for it times out.
+/// Returns a model whose fall takes hours. A test that waits for this fall times out.
 ModelParameters model_that_falls_for_hours() {
   ModelParameters model = preset("paper");
   model.integrator = Integrator::kGeneralizedAlpha;

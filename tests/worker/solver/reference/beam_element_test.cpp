@@ -49,7 +49,8 @@ Nodes energy_gradient(const Nodes& q) {
   return elastic_gradient(q.transpose(), constants()).transpose();
 }
 
-/// Returns the derivative at 0 from five points, exact up to degree 4, the degree of the energy.
+/// Returns the derivative at 0 from five points. It is exact up to degree 4, the degree of the
+/// energy.
 template <class Function>
 std::invoke_result_t<Function, double> five_point_difference(const Function& f, double h) {
   return ((f(-2.0 * h) - f(2.0 * h)) + 8.0 * (f(h) - f(-h))) / (12.0 * h);
@@ -146,7 +147,8 @@ TEST(BeamElement, FiveGaussPointsGiveTheExactEnergy) {
       simpson += weight * 0.5 * (kEA_N * strain * strain + kEI_N_m2 * curvature_squared);
     }
     simpson *= kLength_m / kIntervals / 3.0;
-    // Simpson's rule errs by the fourth power of the interval, 1e-14, times a fourth derivative.
+    // The error of Simpson's rule is the fourth power of the interval, 1e-14, times a fourth
+    // derivative.
     EXPECT_NEAR(energy(q), simpson, 1e-10 * energy(q));
   }
 }

@@ -8,8 +8,8 @@
 
 namespace oblique::solver {
 
-/// Returns the rows of positions, the pin first. Other rows are slopes: one per node, two per
-/// joint.
+/// Returns the rows that contain positions; the first row is the pin. The other rows contain
+/// slopes: one per node, two per joint.
 inline std::vector<Eigen::Index> position_rows(const ModelParameters& model) {
   std::vector<Eigen::Index> rows{0};
   const std::size_t links = model.lengths_m.size();

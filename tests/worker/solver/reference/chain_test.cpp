@@ -83,23 +83,24 @@ TEST(Chain, RigidRotationAboutThePinGivesNeitherForceNorEnergy) {
   for (const double angle_rad : {-1.5, -0.4, 0.9, 3.0}) {
     const Coordinates q = turned(chain, angle_rad);
     EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-    // A strain of 1 would give a force of 3.7e7 N.
+    // For comparison: a strain of 1 gives a force of 3.7e7 N.
     EXPECT_LT(probe.elastic_force(q).cwiseAbs().maxCoeff(), 1e-5);
   }
 }
 
 TEST(Chain, JointsRotateFreely) {
-  // Folding the outer link back onto the inner link, which is as long, stores no energy.
+  // The outer link is folded back onto the inner link, which has the same length. This stores no
+  // energy.
   ModelParameters model = preset("paper");
   model.lengths_m = {0.4, 0.4};
   model.elements_per_link = 1;
   const Chain chain(model);
   Coordinates q = chain.at_rest().q;
-  // The rows are: pin, slope, slope at the joint, joint, slope after the joint, tip, slope.
+  // The rows are: pin, slope, slope before the joint, joint, slope after the joint, tip, slope.
   ASSERT_EQ(chain.rows(), 7);
   q.rightCols<3>() << 0.0, 0.4, 0.0, 1.0, 0.4, 1.0;
   EXPECT_LT(chain.strain_energy_J(q), 1e-20);
-  // Rotating the slope before the joint bends the inner link, which stores energy.
+  // A rotated slope before the joint bends the inner link. This stores energy.
   q.col(2) << 0.0, 1.0;
   EXPECT_GT(chain.strain_energy_J(q), 1.0);
 }

@@ -9,8 +9,8 @@
 #include "worker/solver/reference/generalized_alpha.h"
 #include "worker/solver/reference/motion.h"
 
-/// Compares the constrained chain and generalized-alpha with the chain whose joints are eliminated.
-/// Both describe the same system in different coordinates.
+/// Compares the constrained chain, integrated by generalized-alpha, with the chain whose joints are
+/// eliminated. Both describe the same system in different coordinates.
 namespace oblique::solver {
 namespace {
 

@@ -66,7 +66,8 @@ std::vector<double> tangential_maxima_N(const RigidImpact& exact) {
   return maxima_N;
 }
 
-/// Compares with the closed form at a step of 2e-3 rad, where order 4 gives errors of 1e-11.
+/// Compares a contact with the closed form. With order 4 and a step of 2e-3 rad, its errors are
+/// 1e-11.
 void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-9) {
   const RigidImpact exact(p);
   const CaseResult result = solved(p);
@@ -137,21 +138,23 @@ TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
   };
   for (const auto& p :
        {impact(1.5, 0.4, 1.0, 0.3, 0.6, -2.0, -1.0), impact(3.5, 0.0, 1.0, 0.5, 0.7, 1.0, -1.0)}) {
-    // Halving the step divides the error by about 16, depending on where events lie within steps.
+    // Halving the step divides the error by about 16. The exact factor depends on where events are
+    // within steps.
     EXPECT_GT(error(p, 0.2) / error(p, 0.05), 11.3 * 11.3);
     EXPECT_GT(error(p, 0.1) / error(p, 0.025), 11.3 * 11.3);
   }
 }
 
 TEST(ContactOfARigidBody, ABallWithEqualStiffnessesSticksUntilSeparationOnTheFrictionCone) {
-  // Both forces reach zero together. Separation and both slips coincide; separation comes first.
+  // F_n and F_t reach zero together. So separation coincides with slip in both directions.
+  // Separation comes first.
   const auto p = impact(1.0, 0.0, 1.0, 2.0, 1.0, 0.5, -1.0, 1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "SC SR");
   EXPECT_NEAR(result.duration_s, M_PI * radian_s, 1e-9 * radian_s);
   EXPECT_NEAR(result.vt_out_m_s, -0.5, 1e-9);
   EXPECT_NEAR(result.vn_out_m_s, 1.0, 1e-9);
-  // The extremum of F_t coincides with the turn and counts as a peak.
+  // The extremum of F_t coincides with the end of compression and counts as a peak.
   ASSERT_EQ(result.ft_peaks.size(), 1U);
   EXPECT_NEAR(result.ft_peaks[0].ft_N, 0.5 * std::sqrt(k_N_m), 1e-6);
 }
@@ -164,7 +167,8 @@ TEST(ContactOfARigidBody, ATurnAtTheEndOfSlidingComesFirstAndSlidingMayContinue)
   EXPECT_NEAR(driven.vt_out_m_s, 0.6 - 0.4 * 1.5 * 1.8, 1e-9);
   const CaseResult resting = solved(impact(1.5, 0.0, 1.0, 0.4, 1.0, 0.6, -1.0));
   EXPECT_GT(resting.stick_total_s, radian_s);
-  // Rounding may cause several turns within 1e-13 s, which are ripples without height.
+  // Rounding may change the sign of V_n several times within 1e-13 s. This gives ripples without
+  // height.
   EXPECT_EQ(std::count_if(resting.peaks.begin(), resting.peaks.end(),
                           [](const Peak& peak) { return peak.major; }),
             1);

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-/// Tests the contact of a tip that moves along a given path, whatever the forces.
+/// Tests the contact of a tip that moves along a given path, regardless of the forces.
 namespace oblique::solver {
 namespace {
 
@@ -61,9 +61,9 @@ TEST(Contact, AnAsymmetricCrossingInsideAStepIsLocated) {
 }
 
 /// Returns a path in which both forces rise and fall together for half a period. In the middle, the
-/// turn coincides with the extremum of F_t. At the end, separation coincides with slip in both
-/// directions. The tangential motion leads by `lead_s`. `skew` changes the errors of the
-/// polynomials through a step.
+/// end of compression coincides with the extremum of F_t. At the end, separation coincides with
+/// slip in both directions. The tangential motion leads by `lead_s`. `skew` changes the errors of
+/// the polynomials that approximate a step.
 TipPath in_step(double lead_s, double skew = 0.0) {
   return [lead_s, skew](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
@@ -77,7 +77,7 @@ TipPath in_step(double lead_s, double skew = 0.0) {
 }
 
 TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
-  // Events less than 1e-12 s apart count as simultaneous, whichever comes first.
+  // Events less than 1e-12 s apart count as simultaneous, in either order.
   for (const double lead_s : {0.0, 4e-13, -4e-13}) {
     SCOPED_TRACE(lead_s);
     const TipPath path = in_step(lead_s);
@@ -95,8 +95,9 @@ TEST(Contact, EventsThatCoincideAreTakenInTheirStatedOrder) {
 }
 
 TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
-  // In the first step that contains both events, the polynomials place the extremum of F_t before
-  // the turn. So the extremum is located first, and the turn is found only at the common instant.
+  // In the first step that contains both events, the polynomials have the extremum of F_t before
+  // the turn (the end of compression). So the extremum is located first, and the turn is found only
+  // at the common instant.
   struct Step {
     double skew;
     double h_s;
@@ -115,7 +116,8 @@ TEST(Contact, WhileAnEventIsLocatedACoincidingOneOfHigherRankReplacesIt) {
 }
 
 TEST(Contact, ATurnAndAnExtremumAtTheSameInstantHappenOnceEach) {
-  // This holds for any order of the polynomials' roots, and for any distance due to rounding.
+  // The polynomials may have their roots in any order, and rounding may separate them by any
+  // distance.
   for (const double skew : {-0.3, -0.2, -0.1, -0.05, 0.05, 0.1, 0.2, 0.3}) {
     for (const double step_s : {0.6e-4, 0.7e-4, 0.9e-4, 1.1e-4}) {
       SCOPED_TRACE(skew);
@@ -145,7 +147,7 @@ TEST(Contact, ASlipThatRoundingPutsJustBeforeSeparationIsNotInTheMode) {
 }
 
 TEST(Contact, ARegimeOfZeroDurationIsNotInTheMode) {
-  // Both velocities reach zero together. The turn comes first, then stick begins.
+  // V_t and V_n reach zero together. The end of compression comes first, then stick begins.
   const TipPath path = [](double t_s) -> TipState {
     constexpr double kRate = M_PI / kPeriod_s;
     const double z = kRate * t_s;

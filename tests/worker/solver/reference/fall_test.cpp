@@ -114,7 +114,7 @@ TEST(Fall, TheLargestDropIsFoundWhereverItLiesInItsStep) {
   const FallOf fine(coarse_model(), 9e-6);
   const double largest_m = fine.fall.largest_drop_m();
   const double turn_s = fine.fall.state_at(largest_m).t_s;
-  // These steps place the turn early, in the middle and late in a step.
+  // With these steps the lowest point of the fall is early, in the middle or late in a step.
   for (const double fraction : {0.01, 0.5, 0.99}) {
     SCOPED_TRACE(fraction);
     const FallOf one(coarse_model(), turn_s / (std::floor(turn_s / 9e-6) + fraction));

@@ -27,7 +27,8 @@ ModelParameters coarse_model() {
   return model;
 }
 
-/// Returns a contact force that acts on the tip in both directions, from its present position on.
+/// Returns a contact force on the tip in both directions. It depends on the tip's displacement from
+/// its present position.
 AffineContactForce<double> push_at(const TipState& tip) {
   AffineContactForce<double> force;
   force.fn0 = 3000.0;
@@ -83,8 +84,9 @@ TEST(GeneralizedAlpha, PinAndJointsHoldOverManySteps) {
 }
 
 TEST(GeneralizedAlpha, TheReactionAtThePinCarriesTheHangingChain) {
-  // The chain hangs straight down. The pin O carries its weight, and each joint carries the weight
-  // below. The links start unstretched, so the reactions oscillate around these values.
+  // The chain hangs straight down. The pin O carries the weight of the chain, and each joint
+  // carries the weight below it. The links start unstretched, so the reactions oscillate around
+  // these values.
   const ModelParameters model = preset("paper");
   const Chain chain(model);
   const GeneralizedAlphaMotion motion(model);
@@ -110,7 +112,7 @@ TEST(GeneralizedAlpha, TheReactionAtThePinCarriesTheHangingChain) {
   }
 }
 
-/// Returns which fraction of an axial vibration of a link remains after `steps` steps. Each step is
+/// Returns the fraction of a link's axial vibration that remains after `steps` steps. Each step is
 /// a hundred times too long to resolve the vibration.
 double stiff_vibration_left(double spectral_radius, int steps) {
   ModelParameters model = coarse_model();
@@ -152,7 +154,7 @@ TEST(GeneralizedAlpha, AStepForWhichNewtonFailsIsASolveErrorWithItsTime) {
 }
 
 TEST(GeneralizedAlpha, StepsOfChangingLengthKeepTheOrder) {
-  // Steps change their length around events. Half the length must give a quarter of the error.
+  // Steps change their length around events. Half the step must give a quarter of the error.
   const auto error = [](int divisions) {
     MovingChain moving(coarse_model());
     const auto force = push_at(moving.chain.tip(moving.state));
