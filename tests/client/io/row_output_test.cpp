@@ -63,11 +63,11 @@ TEST_F(RowOutputTest, AFileAppearsOnlyWhenItIsFinished) {
     RowOutput out({.format = Format::kCsv, .file = file_});
     out.print(row_);
   }
-  EXPECT_EQ(contents(), "of before");
+  EXPECT_EQ(contents(), "old content");
   EXPECT_EQ(files(), 1U);
   RowOutput out({.format = Format::kCsv, .file = file_});
   out.print(row_);
-  EXPECT_EQ(contents(), "of before");
+  EXPECT_EQ(contents(), "old content");
   out.finish();
   EXPECT_EQ(contents(), "a\n1\n");
   EXPECT_EQ(files(), 1U);

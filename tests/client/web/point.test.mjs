@@ -95,7 +95,9 @@ test("a refused trace is requested again, and the page shows the reason", async 
       window.shown = [];
       window.fetch = async (path, how) => {
         if (!/\/trace\?/.test(path)) return real(path, how);
-        window.shown.push(document.querySelector("[aria-label='Time histories'] .said").textContent);
+        window.shown.push(
+          document.querySelector("[aria-label='Time histories'] .said").textContent,
+        );
         const status = [409, 503][refused++];
         const error = () => new Response('{"error":"too many wait"}', { status });
         return status ? error() : real(path, how);
