@@ -10,8 +10,7 @@
 
 namespace oblique::worker {
 
-/// A batch with the points of its study. Its points are solved in the order of their positions,
-/// which count from 0.
+/// A batch with the points of its study. Its points are solved in the order of their positions.
 class Batch {
  public:
   /// The points from `begin` to `end` - 1.

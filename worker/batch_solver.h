@@ -28,8 +28,8 @@ class BatchSolver {
   using SolvePoints =
       std::function<void(const Batch&, solver::PointSource&, const solver::TakeOutcome&)>;
 
-  /// A solving thread calls `batch_ended` after the last point of a batch. `batch_ended` must not
-  /// call this object.
+  /// A solving thread calls `batch_ended` after the last point of a batch. It must not call this
+  /// object.
   BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads = 1);
 
   /// Waits for the points that are being solved.

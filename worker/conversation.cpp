@@ -498,8 +498,7 @@ void Conversation::begin_stop(const std::string& reason, int exit_code) {
   stop_reason_ = reason;
   stop_exit_code_ = exit_code;
   stop_deadline_ms_ = now_ms_ + settings_.stop_timeout_ms;
-  // The server leases returned points again. So leases are returned only after all results were
-  // sent.
+  // The server leases returned points again. So leases are returned after all results.
   if (!outbox_.has_waiting() && !held_.empty()) {
     protocol::WorkerMessage message;
     for (const auto& [number, held] : held_) {

@@ -156,8 +156,7 @@ class Conversation {
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
   Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
-  /// To be called when a message could not be sent. The caller drops the later messages of the same
-  /// effects.
+  /// To be called when a message could not be sent. The caller drops later messages of the effects.
   Effects on_send_failed(std::int64_t now_ms);
   /// To be called when the server has rejected the socket. Only a person can remove the cause.
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);

@@ -58,8 +58,7 @@ std::string host_name() {
   return host.data();
 }
 
-/// Returns an error message if `name` has characters that terminals cannot show or is too long;
-/// else an empty text.
+/// Returns an error message if `name` cannot be shown or is too long; else an empty text.
 std::string check_name(const std::string& name) {
   constexpr std::size_t kLongestName = 200;
   const bool is_plain =

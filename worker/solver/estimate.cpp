@@ -41,8 +41,7 @@ double unresolved_waves(const ModelParameters& model) {
   return std::pow(element_m * wavenumber_1_m / std::numbers::pi, 4);
 }
 
-/// Factor from the difference between the two meshes to the error of an output whose error has
-/// order `order`.
+/// Factor from the difference between the meshes to the error of an output of order `order`.
 double factor(const ModelParameters& model, int order) {
   const ModelParameters companion = companion_model(model);
   const double ratio = static_cast<double>(model.elements_per_link) / companion.elements_per_link;
@@ -55,8 +54,7 @@ struct SolvedPoint {
   std::optional<Finger> companion = {};  ///< empty without a coarser mesh or without a fall on it
 };
 
-/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` at the end of
-/// the source.
+/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` at its end.
 std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
                                     bool& ended) {
   using Clock = std::chrono::steady_clock;

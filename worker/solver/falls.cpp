@@ -24,8 +24,7 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// Number of explicit steps in the time sqrt(2 length/g) below which stepping is faster than
-/// collocation.
+/// Stepping is faster than collocation below this number of explicit steps in sqrt(2 length/g).
 constexpr double kFewSteps = 150'000.0;
 
 bool falls_by_collocation(const FallenChain& chain) {

@@ -32,8 +32,7 @@ class Finger {
  public:
   class Parts;  ///< implementation
 
-  /// The fall comes from `falls` or is solved when first needed. Throws InputError when `model` is
-  /// outside its domain.
+  /// The fall comes from `falls` or is solved when first needed. Throws InputError for a bad model.
   explicit Finger(const ModelParameters& model = {}, std::shared_ptr<FallCache> falls = {});
   /// Uses a solved fall. Throws InputError when `model` is outside its domain,
   /// std::invalid_argument when the fall belongs to another model.
@@ -41,8 +40,8 @@ class Finger {
 
   const ModelParameters& model() const;
 
-  /// Largest H: the drop at which the tip first turns back [m]. Throws SolveError when the fall has
-  /// no answer.
+  /// Largest H: the drop at which the tip first turns back [m]. Throws SolveError if the fall
+  /// fails.
   double largest_drop_m() const;
 
   /// Present drop of the tip [m] while another thread solves the fall.

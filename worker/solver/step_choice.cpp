@@ -24,8 +24,7 @@ void check_asked(const char* key, double asked_s, double limit_s) {
   }
 }
 
-/// Ratio of the step at the model's tolerance to the step at the default tolerance, for a method of
-/// order `order`.
+/// Ratio of the step at the model's tolerance to that at the default, for order `order`.
 double at_tolerance(const ModelParameters& model, double order) {
   return std::pow(model.tolerance / ModelParameters().tolerance, 1.0 / order);
 }

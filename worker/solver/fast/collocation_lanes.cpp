@@ -10,8 +10,7 @@ namespace oblique::solver {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// Corrections that no longer shrink are rounding errors if they are below this many times the
-/// allowed error.
+/// Corrections that no longer shrink are rounding errors below this multiple of the allowed error.
 constexpr double kRoundingErrors = 1000.0;
 
 }  // namespace

@@ -23,8 +23,7 @@ struct Complex {
 constexpr std::size_t front_factors(std::size_t pivots) {
   return pivots * (17 - pivots) / 2;
 }
-/// Complex numbers in the factors of a chain's matrix: column by column the inverse of D, then L
-/// below it.
+/// Complex numbers in the factors of a chain's matrix: per column the inverse of D, then L.
 constexpr std::size_t chain_factors(std::size_t links, std::size_t elements_per_link) {
   return links * ((elements_per_link - 1) * front_factors(4) + front_factors(6)) +
          front_factors(8) - front_factors(6);

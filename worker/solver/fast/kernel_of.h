@@ -105,8 +105,7 @@ struct MomentaOfStep {
   void end(std::size_t row, const PlanarVector<Pack>& v) { after.add(row, v); }
 };
 
-/// pefrl_step() of all lanes of the LanePack `Pack`. `Constant` is double if lanes share constants,
-/// else Pack.
+/// pefrl_step() of all lanes of the LanePack `Pack`. `Constant`: double if shared, else Pack.
 template <class Pack, class Constant>
 void step_packs(const ChainTables<Constant>& chain, const PefrlArrays& arrays) {
   const auto packs = [](double* numbers) { return reinterpret_cast<Pack*>(numbers); };

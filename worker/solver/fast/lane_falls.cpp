@@ -26,8 +26,7 @@ constexpr double kUnresolved = 1.5;
 constexpr double kFirstStep = 1.0 / 4000.0;
 /// Longest step, relative to sqrt(length/g): the chain turns by about 0.1 rad in it.
 constexpr double kLongestStep = 1.0 / 100.0;
-/// Allowed error of positions in Newton's method, relative to the length and to the requested
-/// accuracy.
+/// Allowed error of positions in Newton's method, relative to length times requested accuracy.
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 constexpr std::size_t kMaxSteps = 2'000'000;
@@ -305,8 +304,7 @@ class CollocationFall : public Fall {
   std::vector<std::vector<double>> states_;  ///< position, rates, mean acceleration
 };
 
-/// Chooses the step length. Changes are rare and small, because the method is symplectic only with
-/// constant steps.
+/// Chooses the step length, with few small changes: only constant steps are symplectic.
 class StepControl {
  public:
   StepControl(double length_m, double gravity_m_s2, double accuracy)

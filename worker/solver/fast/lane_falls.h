@@ -14,8 +14,7 @@ namespace oblique::solver {
 /// For a smaller tolerance explicit steps are faster than collocation (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 
-/// A fall to solve. The chain must outlive the fall. `progress` is used only while the fall is
-/// solved.
+/// A fall to solve. The chain must outlive it. `progress` is used only during the solution.
 struct FallRequest {
   const Chain* chain;
   std::shared_ptr<const Motion> motion;  ///< explicit motion of the chain

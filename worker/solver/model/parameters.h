@@ -95,8 +95,7 @@ Integrator integrator_named(std::string_view name);
 /// Returns the names in the order of the enumerators.
 std::span<const std::string_view> integrator_names();
 
-/// The model of a preset: `standard`, `paper`, `printed` or `converged`. Throws InputError for
-/// other names.
+/// The model of the preset `standard`, `paper`, `printed` or `converged`. Else throws InputError.
 ModelParameters preset(std::string_view name);
 /// The default preset comes first.
 std::span<const std::string_view> preset_names();

@@ -11,8 +11,7 @@
 
 namespace oblique::solver {
 
-/// A member of a CaseResult, or of a struct in it. Its type is T, or std::optional<T> if it may be
-/// absent.
+/// A member of a CaseResult or of a struct in it, of type T or std::optional<T>.
 template <class T>
 struct Member {
   using Value = T;

@@ -74,8 +74,7 @@ class BandedCholesky {
 
   bool positive_definite() const { return positive_definite_; }
 
-  /// Solves A z = f in place for two interleaved right-hand sides f[2 i + c]. Requires
-  /// positive_definite().
+  /// Solves A z = f in place for two right-hand sides f[2 i + c]. Requires positive_definite().
   void solve_pairs(double* f) const {
     ForwardSubstitution<double> forward;
     const std::size_t rows = rows_.size() - kHalfBandwidth;

@@ -208,8 +208,7 @@ double Chain::tip_inertia_kg() const {
 }
 
 double Chain::highest_frequency_rad_s(double tip_stiffness_N_m) const {
-  // Stiffness along the chain gives the highest frequency, because stiffness across it has no axial
-  // part and is smaller.
+  // Stiffness along the chain gives the highest frequency; stiffness across it is smaller.
   if (tip_stiffness_N_m == 0.0) {
     return std::sqrt(free_eigenvalue_);
   }

@@ -21,8 +21,7 @@ struct ChainState {
   Coordinates v;     ///< [m/s] and [1/s]
   // Only for generalized-alpha; else empty.
   Coordinates acceleration;  ///< q'' at t_s
-  /// (a - q'')/h. The algorithmic acceleration a is q'' at a fixed fraction of the step later.
-  /// Empty after a restart.
+  /// (a - q'')/h, where a is q'' at a fixed fraction of a step later. Empty after a restart.
   Coordinates algorithmic_offset_rate;
   Coordinates multipliers_N;  ///< one column per link
 };
@@ -33,8 +32,7 @@ struct Energies {
   double gravity_J;  ///< 0 at the height of O
 };
 
-/// The elements of all links. Derived classes join the links by assigning columns of Coordinates to
-/// elements. Immutable.
+/// The elements of all links; immutable. Derived classes assign columns of Coordinates to elements.
 class ElementChain {
  public:
   virtual ~ElementChain() = default;

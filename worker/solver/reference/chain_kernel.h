@@ -42,8 +42,7 @@ struct ChainTables {
   const Constant* tip_mass_kg;
 };
 
-/// Rows of the positions and slopes of an element. At a joint, the slope of the inner link comes
-/// before the position.
+/// Rows of an element's positions and slopes. At a joint the inner link's slope comes first.
 struct ElementRows {
   std::size_t p_i;
   std::size_t s_i;

@@ -91,8 +91,7 @@ void Contact::start_search(const EventGuess& guess, double h_s) {
 
 bool Contact::judge_crossing(const TipState& end, const ContactIntegrals<double>& integrals) {
   const double t = trial_s_;
-  // In a shorter step the mean velocity is mostly rounding error, and the search would find the
-  // last event again.
+  // In a shorter step rounding errors dominate, and the search would find the last event again.
   if (t > kSimultaneous_s) {
     const auto first = earliest_event(end, t);
     if (first && first->event != search_.event &&

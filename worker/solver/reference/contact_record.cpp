@@ -167,8 +167,8 @@ ContactMargin::ContactMargin(const ContactLaw& law, const TipState& touch)
 }
 
 void ContactMargin::add_speed(double distance_m_s, std::string_view event) {
-  // Within a step a function may be nearer to zero than at both ends, by at most this part of the
-  // speed at touch.
+  // Within a step a function may be nearer to zero than at its ends, by this part of the touch
+  // speed.
   constexpr double kInside = 0.005;
   speed_m_s_.add(distance_m_s, event);
   near_m_s_ = -(speed_m_s_.distance + kInside * touch_speed_m_s_);

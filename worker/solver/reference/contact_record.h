@@ -165,8 +165,7 @@ inline void ContactMargin::add_step(const ContactLaw& law, const TipState& start
 }
 
 /// Finds the largest magnitude of each reaction in a contact by the parabola through three
-/// neighbouring values. Values are at instants, or means over spans w, which are corrected by w^2
-/// f''/24.
+/// neighbouring values. Values are instantaneous, or means over spans w, corrected by w^2 f''/24.
 class ReactionPeaks {
  public:
   explicit ReactionPeaks(std::size_t reactions) : reactions_(reactions) {}

@@ -154,8 +154,7 @@ ContactIntegrals<double> GeneralizedAlphaMotion::step(const ChainState& from,
 ContactIntegrals<double> GeneralizedAlphaMotion::integrals(const AffineContactForce<double>& force,
                                                            double h_s, const ChainState& from,
                                                            const ChainState& to) const {
-  // Integrates by Hermite rules from values and derivatives at both ends. The rules have a higher
-  // order than the step.
+  // Hermite rules integrate values and derivatives at both ends, with a higher order than the step.
   struct End {
     Eigen::Vector2d F, F_1, F_2;  // F_c and its derivatives in time
     double P, P_1;                // F_t V_t

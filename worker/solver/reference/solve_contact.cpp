@@ -17,8 +17,7 @@ namespace {
 /// Maximum error of the energy balance, relative to the exchanged energy. A larger error shows that
 /// the step does not resolve the contact.
 constexpr double kWorstClosure = 1e-2;
-/// Smallest exchanged energy, relative to the energies at touch. A smaller one is lost in the
-/// rounding of these.
+/// Smallest exchanged energy, relative to the energies at touch, above their rounding errors.
 constexpr double kLeastExchanged = 1e-10;
 
 void balance(const Energies& in, const Energies& out, const ContactRecord& record,
