@@ -151,7 +151,7 @@ double measured_point_s() {
   const double start_s = cpu_time_s();
   for (const solver::Outcome& outcome : solver::solve_points(finger, points)) {
     if (!outcome.result) {
-      throw std::runtime_error("a point with the preset paper fails: " + outcome.error);
+      throw std::runtime_error("a point of the preset `paper` fails: " + outcome.error);
     }
   }
   return (cpu_time_s() - start_s) / static_cast<double>(kPoints);

@@ -47,7 +47,7 @@ std::vector<std::string> head_differences(const Recipe& stored, const Recipe& gi
     }
   }
   if (lines.empty() && protocol::canonical_model(was) != protocol::canonical_model(is)) {
-    lines.emplace_back("model, lengths: they differ");
+    lines.emplace_back("model, lengths: the stored and the given ones differ");
   }
   if (stored.errors() != given.errors()) {
     lines.push_back(fmt::format("errors: stored {}, given {}", stored.errors(), given.errors()));

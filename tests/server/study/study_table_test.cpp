@@ -122,7 +122,8 @@ TEST(RecipeGrowth, DifferingModelKeysAndErrorsAreNamed) {
 TEST(RecipeGrowth, ModelsWithOtherSingleLengthsDiffer) {
   auto given = blocks_of({kFiveMus});
   given.mutable_model()->set_lengths_m(1, 0.3);
-  EXPECT_EQ(growth_of(blocks_of({kFiveMus}), given).difference, "model, lengths: they differ");
+  EXPECT_EQ(growth_of(blocks_of({kFiveMus}), given).difference,
+            "model, lengths: the stored and the given ones differ");
 }
 
 TEST(RecipeGrowth, ALargerSampleIsAGrowthUnlessItIsALatinHypercube) {
