@@ -172,9 +172,10 @@ void add_options(CLI::App& app, Options& options) {
                  "Threads that solve points; the default is one for each core")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMaxThreads));
-  app.add_option("--fall-memory", options.fall_memory_bytes,
-                 "Memory for solved falls, which points share, as 2GB; the default is an eighth of "
-                 "the free memory, or of the container's limit")
+  app.add_option(
+         "--fall-memory", options.fall_memory_bytes,
+         "Memory for solved falls, such as 2GB; the default is an eighth of the free memory, "
+         "or of the container's limit")
       ->type_name("SIZE")
       ->transform(CLI::AsSizeValue(false).description(""));
   app.add_option("--until", session.conversation.exit.until,

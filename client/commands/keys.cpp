@@ -168,8 +168,9 @@ NewCommand<KeysFlags> add_action(CLI::App& keys, Action& parsed, const char* nam
                                  const char* summary, int (*run)(const KeysFlags&, Console&)) {
   auto added = new_command(keys, parsed, name, summary, "", run);
   added.command
-      .add_option("--dir", added.flags.folder,
-                  "folder with the server's key and the list; default: this folder, else keys")
+      .add_option(
+          "--dir", added.flags.folder,
+          "folder of the server's key and the admitted keys; default: this folder, else keys")
       ->type_name("DIR");
   return added;
 }

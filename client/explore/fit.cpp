@@ -306,7 +306,7 @@ class IntervalEnd {
   static constexpr double kJump = 0.05;       ///< of `rise_of`
   static constexpr double kShortest = 5e-4;   ///< step outwards, of the first one
 
-  /// 0 at the minimum, 1 at the end, and linear where the residuals are.
+  /// Rise of chi: 0 at the minimum, 1 at the end of the interval, linear if the residuals are.
   double rise_of(const FitStep& step) const {
     return std::sqrt(std::max(step.chi2 - minimum_, 0.0) / limit_);
   }

@@ -334,8 +334,8 @@ struct Sample {
     }
     places.assign(around.begin(), around.end());
   }
-  /// Narrows the bracket and requests its middle. The first call chooses the border of the same
-  /// regions that is nearest to the vertex.
+  /// Narrows the bracket and requests its middle. The first call chooses, of the borders
+  /// between the vertex's two regions, the nearest one.
   void narrow(std::span<const int> regions_of_places) {
     if (places.size() == 1) {
       (regions_of_places[0] == vertex.from ? low : high) = places[0];

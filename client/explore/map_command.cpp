@@ -262,7 +262,7 @@ struct FoundMap {
   const MapFlags& flags;
   const MapPlane& plane;
   const GrowingStudy& study;
-  std::vector<MapRegion> regions = {};  ///< by region number, the largest region first
+  std::vector<MapRegion> regions = {};  ///< element i describes region i; region 0 is the largest
   Borders borders = {};
   std::vector<CurveShift> shifts = {};  ///< of each curve
   /// The values of --over at the points of the coarse grid, row by row from the lowest; NaN: none.

@@ -99,8 +99,8 @@ std::vector<Statistic> statistics_of(const SampledStudy& study, std::size_t outp
   return statistics;
 }
 
-/// Adds the statistics of an output to the table; probabilities of texts in falling order. Adds
-/// lines at the quantiles of numbers to the histogram.
+/// Adds the statistics of an output to the table. If its values are texts, their probabilities are
+/// in falling order. If they are numbers, adds a line at each quantile to the histogram.
 void add_output(const SampledStudy& study, std::size_t output, protocol::Table& table,
                 plot::Panel& histogram) {
   const std::size_t points = study.columns.front().numbers.size();

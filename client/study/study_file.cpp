@@ -226,7 +226,7 @@ class BlockReader {
   /// Throws if `key` is no key of an axis and resembles a key of a block.
   void check_key(const toml::key& key) const {
     if (!protocol::nearest(key.str(), kBlockKeys).empty() && !protocol::is_axis_key(key.str())) {
-      file_.fail(key, fmt::format("{}: besides its axes a block has {}",
+      file_.fail(key, fmt::format("{}: apart from axes, the keys of a block are {}",
                                   protocol::unknown_key(key.str(), kBlockKeys),
                                   protocol::joined(kBlockKeys)));
     }

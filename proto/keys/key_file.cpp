@@ -224,8 +224,9 @@ void refuse_mode(const std::string& path, mode_t refused, std::string_view risk,
   }
 }
 
-/// Returns the secret key and overwrites it with zeros in `text`, because a parser leaves copies of
-/// its text in memory. Returns nothing if no line begins with `secret = "KEY"`.
+/// Returns the secret key and overwrites it with zeros in `text`: the TOML parser, which reads
+/// `text` next, leaves copies of its input in memory. Returns nothing if no line begins with
+/// `secret = "KEY"`.
 std::optional<SecretKey> take_secret(std::string& text) {
   const std::size_t line = text.starts_with("secret") ? 0 : text.find("\nsecret");
   const std::size_t quote = text.find_first_of("\"'", line);

@@ -170,8 +170,9 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
       ->type_name("FILE");
   app.add_flag("--allow-network-disk", loop.allow_network_disk,
                "Allow a database on a network file system, where a second machine could damage it");
-  app.add_option("--listen", loop.access.listen,
-                 "Address to listen on, * for all; others than loopback need --keys or --insecure")
+  app.add_option(
+         "--listen", loop.access.listen,
+         "Address to listen on, * for all; addresses other than loopback need --keys or --insecure")
       ->type_name("ADDRESS");
   app.add_option("--keys", loop.access.keys,
                  "Key file of the server, from `oblique keygen`; the list of admitted keys, "

@@ -35,7 +35,7 @@ enum class Suspicion : std::uint8_t {
   kSound,    ///< may be in a batch of any size with other points
   kSuspect,  ///< had several losses; is leased to a worker that holds nothing else
   kRisky,    ///< a single point; a worker was lost while it held only this point
-  kFailing   ///< several workers were lost with only this point; it fails if none of them returns
+  kFailing   ///< several workers were lost holding only this point; it fails if none returns
 };
 
 struct LossLimits {

@@ -52,7 +52,7 @@ class PointOrder {
   std::vector<Run> runs_;                ///< sorted by place
   std::vector<std::uint32_t> by_point_;  ///< indices of runs, sorted by point
   std::vector<std::uint64_t> groups_;    ///< first place of each group
-  std::uint64_t end_ = 0;                ///< from this place on, places equal point numbers
+  std::uint64_t end_ = 0;  ///< place after all runs; from here on the point number is the place
 };
 
 }  // namespace oblique::server

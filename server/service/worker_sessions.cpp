@@ -358,7 +358,7 @@ void WorkerSessions::send_stopping(WorkerId worker) {
   send(worker, message);
 }
 
-/// `lease` is the lease of the batch in the frame; 0: none. A gone or busy worker causes an event.
+/// `lease` is that of the batch in the frame, or 0. A frame that cannot be delivered is an event.
 void WorkerSessions::send_frame(WorkerId worker, const std::string& frame, LeaseId lease) {
   const auto known = workers_.find(worker);
   if (known == workers_.end()) {

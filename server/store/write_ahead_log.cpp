@@ -50,7 +50,7 @@ void WriteAheadLog::rewrite() {
   sqlite3_file* file = file_of(database_);
   const int code = file != nullptr ? write_again(file) : SQLITE_OK;
   if (code != SQLITE_OK) {
-    throw StorageError("the write-ahead log cannot be rewritten at the start: " +
+    throw StorageError("the write-ahead log could not be rewritten when the server started: " +
                        std::string(sqlite3_errstr(code)));
   }
 }

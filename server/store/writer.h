@@ -142,7 +142,8 @@ class Writer {
 
   void submit(WriteJob job);
 
-  /// Continues deletions that an earlier process left. Nothing else may use the storage any more.
+  /// Continues deletions that an earlier process did not finish. After this call only the writer's
+  /// thread may use the storage.
   void resume_deletions();
 
   /// Writes the waiting jobs, merges the log and ends the thread. Interrupts statements that take

@@ -110,7 +110,7 @@ void add_point(std::vector<OutputStudy>& outputs, std::size_t point,
   for (const auto& output : convergence.outputs) {
     const double limit = output.extrapolation.limit;
     if (output.name == "fn_peak_N" ||
-        limit == 0.0) {  // for example the stick of a contact without stick
+        limit == 0.0) {  // such as stick_total_s of a contact without stick
       continue;
     }
     std::vector<std::optional<double>> errors;

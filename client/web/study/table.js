@@ -147,6 +147,6 @@ export class PointTable {
     const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });
     this.load();
-    this.view.draw(); // the commands that the view shows contain the order
+    this.view.draw(); // redraws the commands, which contain the sort order
   }
 }

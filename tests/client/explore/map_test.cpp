@@ -165,8 +165,8 @@ TEST(FindBorders, RasterCellsAreInTheRegionsThatTheCurvesSay) {
       const double y = (static_cast<double>(i / Borders::kRaster) + 0.5) / Borders::kRaster;
       wrong += borders.raster[i] != regions(x, y) ? 1 : 0;
     }
-    // A chord of length h is at most h^2/8 times the curvature away from its arc. The curvature is
-    // at most 8, and the borders are at most 10 long.
+    // The distance between a chord of length h and its arc is at most h^2/8 times the curvature.
+    // The curvature is at most 8, and the total length of the borders is at most 10.
     const double h = std::sqrt(2.0) / solver.grid.cells;
     EXPECT_LT(wrong, static_cast<double>(borders.raster.size()) * 10.0 * 8.0 * h * h / 12.0);
   }

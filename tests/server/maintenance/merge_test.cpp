@@ -233,8 +233,8 @@ TEST_F(MergeTest, TheSourceIsNotChangedAndTheStateOfItsStudyIsCopied) {
             "paused 7 2024-01-01T00:00:00.000Z later");
 }
 
-/// Makes this process kill itself when a connection opened later updates a study. Merging updates a
-/// study after storing the last of its rows.
+/// From now on this process kills itself as soon as a new database connection updates a study.
+/// Merging updates a study after storing the last of its rows.
 void kill_when_a_study_is_updated() {
   const auto watch = [](sqlite3* database) {
     sqlite3_update_hook(

@@ -46,7 +46,7 @@ const Comments& list_columns() {
       {"t1_s", "s | end, counted from touch"},
       {"kind", " | compression or restitution"},
       {"fn_N", "N | normal force"},
-      {"ft_N", "N | largest tangential magnitude around it"},
+      {"ft_N", "N | largest magnitude of the tangential force around it"},
       {"force_N", "N | magnitude of the largest force"},
       {"major", " | 1: major; 0: a ripple"}};
   return kColumns;

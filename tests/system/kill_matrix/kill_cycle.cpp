@@ -26,9 +26,9 @@ constexpr std::chrono::milliseconds kPollInterval{5};
 constexpr int kMaxAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code of a complete study with failed points
 
-// The study has several models, so that batches end during the study. The first block takes long
-// enough for heartbeats and about twenty commits. A filter leaves out half of the second block.
-// Both points of the last block fail.
+// The study has several models, because a batch ends at the end of a model. The first block takes
+// long enough for heartbeats and about twenty commits. A filter leaves out half of the second
+// block. Both points of the last block fail.
 constexpr const char* kStudy = R"(name = "matrix"
 [model]
 preset = "paper"

@@ -93,12 +93,12 @@ constexpr ResultList list_of(std::string_view unit, std::string_view meaning,
 constexpr ResultList kPeaks =
     list_of<&Result::peaks, &Peak::t_s, &Peak::fn_N, &Peak::ft_N, &Peak::major>(
         "s, N",
-        "peaks of the normal force, ripples included: t_s from touch, fn_N, ft_N the largest "
-        "tangential magnitude around the peak, major 1 or, for a ripple, 0; peaks[1] may be a "
-        "ripple, the second major peak is major_peak_2_N");
+        "peaks of the normal force, ripples included: t_s since touch, fn_N, ft_N the largest "
+        "magnitude of the tangential force around the peak, major 1 or, for a ripple, 0; peaks[1] "
+        "may be a ripple, the second major peak is major_peak_2_N");
 constexpr ResultList kFtPeaks =
     list_of<&Result::ft_peaks, &TangentialPeak::t_s, &TangentialPeak::ft_N>(
-        "s, N", "peaks of the tangential magnitude: t_s from touch, and ft_N");
+        "s, N", "peaks of the magnitude of the tangential force: t_s since touch, and ft_N");
 constexpr ResultList kPhases = list_of<&Result::phases, &Phase::kind, &Phase::t0_s, &Phase::t1_s>(
     "s", "intervals of compression and restitution: kind, t0_s, t1_s, counted from touch");
 constexpr ResultList kStickIntervals =

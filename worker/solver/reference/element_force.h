@@ -97,7 +97,7 @@ struct ElasticForces {
   PlanarVector<Real> by_t;  ///< dU/dt
 };
 
-/// The force K q of eqs. 9 to 11, as corrected: dU/dq of U (eq. 7) in closed form.
+/// The force K q of the corrected eqs. 9 to 11 (theory.md): dU/dq of U (eq. 7) in closed form.
 ///
 /// With S = EA l and eps = sum E_k P_k, dU/dc_a = S sum_b K_ab c_b + bending, where
 /// K_ab = 1/2 int eps P_a P_b dzeta over [-1, 1] (beam_element.h has the notation). The product
@@ -106,8 +106,7 @@ struct ElasticForces {
 ///   E_2 = c0.c2 + c1.c1/3 + c2.c2/7,          E_3 = 3/5 c1.c2,  E_4 = 9/35 c2.c2,
 ///   K_00 = E_0,  K_01 = E_1/3,  K_02 = E_2/5,  K_11 = (E_0 + 2/5 E_2)/3,
 ///   K_12 = 2/15 E_1 + 3/35 E_3,  K_22 = E_0/5 + 2/35 E_2 + 2/35 E_4.
-/// Scaled coordinates u = p_j - p_i = l c0, d = s_j - s_i = 2 c1 and t = 2 c2 leave the constants
-/// to a table.
+/// The code uses u = p_j - p_i = l c0, d = s_j - s_i = 2 c1, t = 2 c2, with factors in a table.
 template <class Real, class Constant>
 inline ElasticForces<Real> elastic_forces(const PlanarVector<Real>& p_i,
                                           const PlanarVector<Real>& s_i,

@@ -73,8 +73,8 @@ struct FallSolution {
   std::string error;
 };
 
-/// A fall in steps of one length by any integrator. The caller takes the steps and passes the few
-/// states that are kept. The state at a drop is found by steps from the kept state before it.
+/// A fall in equal steps of any integrator. The caller takes the steps and passes the few states
+/// that are kept. Steps from the last kept state before a drop give the state at this drop.
 class SteppedFall : public Fall {
  public:
   /// Throws SolveError when sqrt(2 length/g) takes more than 1e9 steps. Writes to `progress`, if

@@ -164,7 +164,8 @@ std::string row_of(std::string_view name, const std::vector<Judged>& judged) {
 
 void print_modes(const Results& results, const Results& truth,
                  const std::vector<ErrorEstimate>& errors) {
-  std::array<std::array<int, 2>, 2> count{};  // points by [companion agrees][exact result agrees]
+  // Number of points by [companion has the same mode][exact result has the same mode].
+  std::array<std::array<int, 2>, 2> count{};
   for (std::size_t i = 0; i < results.size(); ++i) {
     if (results[i] && truth[i] && errors[i].mode_same) {
       const bool right = results[i]->major_mode == truth[i]->major_mode;
