@@ -129,7 +129,7 @@ void check_variables(Console& console, const AutoscaleFlags& flags, const std::s
     return !environment_variable(variable).value_or("").empty();
   };
   const auto is_given = [&](const char* variable) {
-    // --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=..." may also set the variable.
+    // The job also gets variables from --sbatch-args "--export=ALL,OBLIQUE_WORKER_SERVER=...".
     return is_set(variable) || flags.sbatch_arguments.find(variable) != std::string::npos;
   };
   constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;

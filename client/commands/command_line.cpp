@@ -38,8 +38,8 @@ constexpr const char* kExamples = R"(Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 130 stopped by Ctrl-C (128 + number of the signal).)";
 
-/// Wraps the description of a flag or command, which begins at `column`. Leaves examples with a
-/// remark unchanged: they have the same layout, but begin with "oblique".
+/// Wraps the description of a flag or command, which begins at `column`. Leaves lines that begin
+/// with "oblique" unchanged: they are example commands with a remark.
 std::string fitted_meaning(const std::string& line, std::size_t width, std::size_t column) {
   if (line.size() <= width || width <= column || line.size() <= column || line[column - 1] != ' ' ||
       line[column] == ' ' || line.starts_with("  oblique ")) {
@@ -128,7 +128,7 @@ int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
-/// Exit code if the reader of the output has closed it, as for a program killed by SIGPIPE.
+/// Exit code if the reader of the output has closed it; programs killed by SIGPIPE have it too.
 constexpr int kReaderGone = 128 + SIGPIPE;
 
 int carry_out(Console& console, const std::string& words, const Action& action) {

@@ -21,7 +21,7 @@ using protocol::kWrongUsage;
 /// has been parsed.
 using Action = std::function<int(Console& console)>;
 
-/// A command with its flags. Their variables live as long as the command.
+/// A command and the values of its flags, which live as long as the command.
 template <class Flags>
 struct NewCommand {
   CLI::App& command;

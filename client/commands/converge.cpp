@@ -52,7 +52,7 @@ void note_levels(Console& console, const char* what, const std::vector<Level>& l
 struct BothRefinements {
   Refinement mesh;
   Refinement step;
-  std::optional<SolvedLevel> exact_fall;  ///< only if the tolerance controls the steps of the fall
+  std::optional<SolvedLevel> exact_fall;  ///< nothing if the fall has a fixed step
 };
 
 BothRefinements refined(Console& console, const std::vector<Level>& meshes,

@@ -68,7 +68,7 @@ bool are_one_file(const std::string& one, const std::string& other) {
 std::vector<std::string> checked_sources(const MergeFlags& flags, Console& console) {
   std::vector<std::string> sources;
   for (const std::string& source : flags.sources) {
-    if (!std::filesystem::exists(source)) {  // checked before a new target is created
+    if (!std::filesystem::exists(source)) {  // fails before the target is created
       throw std::runtime_error(fmt::format("there is no file {}", source));
     }
     if (are_one_file(source, flags.target.file)) {

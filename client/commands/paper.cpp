@@ -34,10 +34,10 @@ constexpr const char* kPaperExamples = R"(Examples:
 struct PaperFlags {
   std::string preset{"paper"};
   std::string study{"paper"};
-  std::string database;  // empty: solves the cases now
+  std::string database;  // if empty, the cases are solved now
   std::string format{"table"};
   bool modes = false;
-  std::string figures;  // folder; empty: prints tables
+  std::string figures;  // folder; if empty, tables are printed
 };
 
 protocol::Table rows_of_study(Source& source, const std::string& study) {

@@ -67,8 +67,8 @@ int query(const QueryFlags& flags, Console& console) {
     }
     return kDone;
   } catch (const solver::InputError&) {
-    // For an unknown study, throws std::runtime_error (exit code 1). The error of the query would
-    // give exit code 2.
+    // Throws std::runtime_error (exit code 1) if the study is unknown. Otherwise rethrows the error
+    // of the query (exit code 2).
     (void)study_named(*source, flags.query.study);
     throw;
   }

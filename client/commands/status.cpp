@@ -183,7 +183,7 @@ int watch(const StatusFlags& flags, Console& console) {
       return print_end(console, status, [&](const std::string& sql) { return source->query(sql); });
     }
   } catch (const Interrupted&) {
-    // The end of the watch is reported below.
+    // The message below reports that watching the study ended.
   }
   console.notes() << "Watching ended; the study continues.\n";
   return stop.exit_code();

@@ -63,7 +63,7 @@ std::vector<FingerPoint> points_over(solver::FallCache& falls, const protocol::P
 /// Axes that change the fall.
 struct FallAxes {
   std::set<std::string> drawn;  ///< keys with a distribution
-  double other_values = 1.0;    ///< product of the numbers of values of the other keys
+  double other_values = 1.0;    ///< combinations of the values of keys without a distribution
 };
 
 FallAxes fall_axes(const protocol::Recipe& recipe) {
@@ -95,7 +95,7 @@ StudyCost measured_cost(const protocol::PointTable& table, const protocol::Study
   StudyCost cost;
   cost.threads = std::max(1U, std::thread::hardware_concurrency());
   std::set<std::uint64_t> different;
-  std::vector<ModelParameters> models;  // one for each different fall
+  std::vector<ModelParameters> models;  // models with different falls
   for (const std::uint64_t example : size.examples) {
     const ModelParameters model = table.model(table.point(example).model);
     const bool in_lanes = solver::fall_side_by_side(model, model);

@@ -30,7 +30,7 @@ constexpr double kRoundingFraction = 1e-9;
 Extrapolation monotone(double last, double before, double value, double highest_order) {
   const double order = std::log2(before / last);
   const double believed = std::min(order, highest_order);
-  // The last difference, or the difference that theory predicts if that is larger.
+  // The larger of the last difference and the difference that theory predicts for it.
   const double difference =
       std::copysign(std::max(std::abs(last), std::abs(before) * std::exp2(-highest_order)), last);
   const double correction = difference / (std::exp2(believed) - 1.0);
@@ -69,8 +69,8 @@ void add_lone(std::vector<ContactChange>& changes, const std::vector<double>& co
   }
 }
 
-// Returns the states of `mode` ("sC sR sC sR") up to peak number `peak`, counted from 0. With
-// `whole_restitution` they include the whole restitution after the peak, else only its first state.
+// Returns the states of `mode` ("sC sR sC sR") up to peak number `peak`, counted from 0, and the
+// first state of the next restitution. With `whole_restitution`, includes its other states too.
 std::string mode_to_peak(const std::string& mode, std::size_t peak, bool whole_restitution) {
   std::size_t restitutions = 0;
   bool in_restitution = false;
@@ -311,7 +311,7 @@ std::vector<Level> mesh_levels(const solver::ModelParameters& model, int coarses
     }
     levels.push_back(std::move(level));
   }
-  constexpr std::size_t kFewest = 3;  // minimum number of levels to find the order
+  constexpr std::size_t kFewest = 3;  // levels needed to find the order of convergence
   if (levels.size() < kFewest || n != 2 * finest) {
     throw solver::InputError(fmt::format(
         "--finest {} is not allowed: it must be 4, 8, 16, ... times the {} elements a link of "

@@ -45,7 +45,7 @@ struct ContactPoint {
 struct SolvedLevel {
   Level level;
   solver::CaseResult result;
-  double wall_s = 0.0;  ///< time of fall and contact
+  double wall_s = 0.0;  ///< wall time of solving fall and contact
 };
 
 /// Solves `point` on all levels in parallel. Levels with the same fall share it. `line` shows
@@ -82,8 +82,8 @@ struct Extrapolation {
 /// P. Differences below `resolution`, in the unit of the values, count as rounding.
 Extrapolation extrapolate(std::span<const double> values, double highest_order, double resolution);
 
-/// A part of a contact that the solution on another level does not have. It indicates a grazing
-/// event: for example, V_n touches zero and its sign may or may not change.
+/// A part of a contact that is missing on another level. The cause is a grazing event, for example
+/// that V_n just reaches zero: small errors then decide whether its sign changes.
 struct ContactChange {
   enum class Kind {
     kCompression,  ///< an additional compression: V_n changes its sign twice more
@@ -136,11 +136,11 @@ std::vector<Output> outputs_of(const solver::CaseResult& result);
 
 struct OutputConvergence {
   std::string name;
-  double scale;  ///< scale of the finest level
+  double scale;  ///< Output::scale on the finest level
   /// One value per level, coarsest first; nothing for a level whose states before the value differ
   /// from those of the finest level.
   std::vector<std::optional<double>> values;
-  /// Extrapolation of the values after the last missing one.
+  /// Extrapolation of the values of the levels after the last level without a value.
   Extrapolation extrapolation;
 
   double finest() const { return *values.back(); }
@@ -180,7 +180,7 @@ void print_refinement(std::ostream& out, const Refinement& refinement);
 /// Returns levels, outputs, changes and verdict as one JSON object.
 nlohmann::ordered_json json_of(const Refinement& refinement);
 
-/// Compares the first level of `step` with the same contact after the fall of exact_fall_level().
+/// Compares the first level of `step` with the same contact after a fall with a smaller tolerance.
 /// Returns "A fall solved for 1e-06 instead of 1e-05 changes outputs by at most ... %".
 std::string fall_sentence(const Refinement& step, const SolvedLevel& exact_fall);
 

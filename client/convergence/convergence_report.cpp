@@ -19,8 +19,8 @@ using solver::readable_number;
 
 constexpr double kMicroseconds = 1e6;
 constexpr double kPercent = 100.0;
-/// Outputs whose last difference is below this part of their scale count as settled: on a fine
-/// mesh, fast vibrations are about this large.
+/// An output counts as settled if its last difference is below this fraction of its scale. On a
+/// fine mesh, fast vibrations cause differences of about this size.
 constexpr double kSettled = 1e-3;
 
 bool is_settled(const OutputConvergence& output) {
@@ -168,7 +168,7 @@ double fall_tolerance(const Refinement& step) {
 
 using FallChanges = std::vector<std::pair<std::string, std::optional<double>>>;
 
-// Returns the relative changes of the outputs; nothing if the modes differ.
+// Returns the relative change of each output by the exact fall; nothing if the mode changes.
 std::optional<FallChanges> changes_of_fall(const Refinement& step, const SolvedLevel& exact_fall) {
   const auto& exact = exact_fall.result;
   if (step.levels.front().result.major_mode != exact.major_mode) {

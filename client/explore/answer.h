@@ -15,7 +15,7 @@ namespace oblique::client {
 /// Format and file of the answer of an exploration.
 struct AnswerFlags {
   std::string format{"table"};  ///< of standard output
-  std::string file;             ///< numbers or a picture, by its ending; empty: none
+  std::string file;             ///< its ending chooses numbers or a picture; may be empty
 };
 /// Adds --format and --out. `flags` must live as long as `command`.
 void add_answer_flags(CLI::App& command, AnswerFlags& flags);
@@ -40,7 +40,7 @@ void put_out(Console& console, const AnswerFlags& flags, const Answer& answer);
 protocol::Value value_of(double number);
 /// Adds the columns of an estimate: NAME, NAME_from and NAME_to.
 void append_columns(protocol::Table& table, const std::string& name);
-/// Adds the values of these columns.
+/// Adds the value of an estimate and the ends of its interval, for the columns of `append_columns`.
 void append_values(protocol::Row& row, const Estimate& estimate);
 /// Formats a table for people.
 std::string text_of(const protocol::Table& table);

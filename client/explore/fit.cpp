@@ -27,12 +27,12 @@ using Eigen::VectorXd;
 using solver::InputError;
 using std::numbers::pi;
 
-/// Angle of a central difference. Outputs of the solver are smooth to about 1e-7 of themselves, so
-/// derivatives are good to about 1e-5.
+/// Step of an angle in central differences. Outputs of the solver are smooth up to relative errors
+/// of about 1e-7, so derivatives have relative errors of about 1e-5.
 constexpr double kDifference = 3e-3;
-/// Residual of a missing prediction: large enough to have the step refused.
+/// Residual of a missing prediction. It is so large that the fit rejects the step.
 constexpr double kMissing = 1e9;
-/// An unknown is at a bound if their angles differ by less.
+/// An unknown is at a bound if its angle differs from the bound's angle by less than this.
 constexpr double kAtBound = 1e-2;
 /// 95 % quantile of chi2 with one degree of freedom.
 constexpr double kChi2Quantile = 3.841458820694124;
@@ -101,7 +101,7 @@ std::vector<FitStep> steps_at(const FitProblem& problem, std::vector<VectorXd> p
                               const std::string& what) {
   std::vector<VectorXd> points;
   for (VectorXd& angles : places) {
-    // Mirrors an angle beyond a bound, which has the same cosine.
+    // Mirrors an angle outside the bounds to the angle inside that has the same cosine.
     angles = 2.0 * pi - angles.array().unaryExpr(
                             [](double w) { return std::abs(std::remainder(w, 2.0 * pi)); });
     points.push_back(parameters_at(problem, angles));
@@ -132,8 +132,8 @@ std::vector<FitStep> steps_at(const FitProblem& problem, std::vector<VectorXd> p
 }
 
 /// Levenberg and Marquardt's step (J^T J + damping) delta = -J^T r, with the least damping from
-/// 1e-3 for which the length of delta is at most `radius`. The damping of 1e-3 keeps combinations
-/// of unknowns without effect where they are.
+/// 1e-3 for which the length of delta is at most `radius`. Even the least damping prevents steps
+/// along combinations of unknowns that have no effect.
 VectorXd damped_step(const MatrixXd& jacobian, const VectorXd& residuals,
                      double radius = HUGE_VAL) {
   MatrixXd normal = jacobian.transpose() * jacobian;
@@ -147,7 +147,7 @@ VectorXd damped_step(const MatrixXd& jacobian, const VectorXd& residuals,
   }
 }
 
-/// The place with the least chi2 among the start and Sobol's first points.
+/// Returns the angles with the least chi2 among the given start and 15 points of Sobol's sequence.
 VectorXd best_start(const FitProblem& problem) {
   constexpr std::uint64_t kPlaces = 16;
   std::vector<VectorXd> places(kPlaces, problem.start());
@@ -198,14 +198,14 @@ FitStep minimise(const FitProblem& problem, const VectorXd& start, double tolera
 
 namespace {
 
-/// Adds the covariance of the angles of the unknowns in `free` and what the data leave open. With
-/// the columns of J scaled to length 1 by D, (J D)^T J D = V L V^T, it is D V L^-1 V^T D. A small
-/// eigenvalue in L is a combination that the data leave open; its unknowns are the large parts of
-/// its vector in V.
+/// Adds the covariance of the angles of the unknowns in `free`, and the combinations of unknowns
+/// that the data do not determine. D scales the columns of J to length 1, and V L V^T is the
+/// eigendecomposition of (J D)^T J D. The covariance is D V L^-1 V^T D. A small eigenvalue in L
+/// means an undetermined combination: the unknowns with large components of its eigenvector in V.
 void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& free, Fit& fit) {
-  constexpr double kUndetermined = 1e-6;      // eigenvalue, from the noise of differences
-  constexpr double kPoorlyDetermined = 1e-2;  // as two unknowns with a correlation of 0.99
-  constexpr double kLeastPart = 0.2;          // of a unit vector
+  constexpr double kUndetermined = 1e-6;  // upper limit of an eigenvalue; above numerical errors
+  constexpr double kPoorlyDetermined = 1e-2;  // eigenvalue if two unknowns have correlation 0.99
+  constexpr double kLeastPart = 0.2;          // component of a unit eigenvector
   MatrixXd columns = fit.minimum.jacobian(Eigen::all, free);
   const VectorXd scales = columns.colwise().norm().cwiseInverse();
   columns *= scales.asDiagonal();
@@ -237,8 +237,8 @@ void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& f
 
 /// The result at a minimum, without intervals.
 Fit fit_at(const FitProblem& problem, const FitStep& minimum, bool is_scaled) {
-  constexpr double kLeastEffect = 0.1;  // of the whole range [standard deviations]
-  constexpr double kLeastScale = 1e-6;  // exact data: chi2 is the noise of the differences
+  constexpr double kLeastEffect = 0.1;  // effect from bound to bound, in standard deviations
+  constexpr double kLeastScale = 1e-6;  // if the data are exact, chi2 has only numerical errors
   Fit fit;
   fit.minimum = minimum;
   fit.unknowns.resize(problem.unknowns.size());
@@ -264,10 +264,11 @@ Fit fit_at(const FitProblem& problem, const FitStep& minimum, bool is_scaled) {
   return fit;
 }
 
-/// Searches one end of a profile-likelihood interval: the farthest angle of an unknown with which
-/// chi2 <= minimum + limit is possible. For a change d of this angle the linearised model has the
-/// least residuals r + g d over the other angles. A trial goes from the farthest step inside to
-/// |r + g d|^2 = minimum + limit; one outside is followed by a shorter one.
+/// Searches one end of a profile-likelihood interval: the farthest angle of an unknown for which
+/// some values of the other angles give chi2 <= minimum + limit. If the angle changes by d, the
+/// linearised model has the least residuals r + g d over the other angles. A trial starts from the
+/// farthest step inside the interval and solves |r + g d|^2 = minimum + limit. A trial that ends
+/// outside is corrected or shortened.
 class IntervalEnd {
  public:
   /// `side` is -1 for the lower end, 1 for the upper one.
@@ -280,10 +281,10 @@ class IntervalEnd {
   bool is_open() const { return is_open_; }
   double angle() const { return inside_.angles[unknown_]; }
   bool is_at_bound() const { return reach() < kAtBound; }
-  /// Whether chi2 jumps over the limit here.
+  /// Whether chi2 jumps over the limit at this end.
   bool is_cut() const { return !is_at_bound() && rise_of(inside_) < 1.0 - kJump; }
 
-  /// Takes the model at the trial, and chooses the next one.
+  /// Takes the model at the trial, and chooses the next trial.
   void take(const FitStep& step) {
     const double rise = rise_of(step);
     if (rise < 1.0 + kTolerance) {
@@ -304,17 +305,17 @@ class IntervalEnd {
  private:
   static constexpr double kTolerance = 2e-3;  ///< of `rise_of`
   static constexpr double kJump = 0.05;       ///< of `rise_of`
-  static constexpr double kShortest = 5e-4;   ///< step outwards, of the first one
+  static constexpr double kShortest = 5e-4;   ///< shortest step as a fraction of the first one
 
-  /// Rise of chi: 0 at the minimum, 1 at the end of the interval, linear if the residuals are.
+  /// sqrt((chi2 - minimum) / limit): 0 at the minimum, 1 at the end, linear for linear residuals.
   double rise_of(const FitStep& step) const {
     return std::sqrt(std::max(step.chi2 - minimum_, 0.0) / limit_);
   }
-  /// How far the bound is.
+  /// Distance of the angle from the bound on this side.
   double reach() const { return side_ < 0.0 ? angle() - pi : 2.0 * pi - angle(); }
 
-  /// Chooses the trial that is this part of the way from `base` to the end, at most `farthest`
-  /// farther outwards. Returns how far the trial is from the farthest step inside.
+  /// Sets the trial to `base` plus the fraction `part` of the step to the end. The step is at most
+  /// `farthest` long outwards. Returns how far beyond the farthest step inside the trial is.
   double choose_trial(const FitStep& base, double farthest, double part) {
     constexpr double kLongest = 0.5;
     MatrixXd others = base.jacobian;
@@ -343,13 +344,13 @@ class IntervalEnd {
   double limit_;
   FitStep inside_;
   VectorXd trial_;
-  double part_ = 1.0;  ///< of the step that the linearised model gives
+  double part_ = 1.0;  ///< fraction of the linearised model's step that a trial takes
   double shortest_ = 0.0;
-  bool is_correction_ = false;  ///< the trial starts from a step outside
+  bool is_correction_ = false;  ///< the trial starts from a step outside the interval
   bool is_open_ = !is_at_bound();
 };
 
-/// Fills in the intervals, all ends side by side. Returns the step with the least chi2 on the way.
+/// Adds the intervals, all ends in parallel. Returns the step with the least chi2 of all trials.
 FitStep add_intervals(const FitProblem& problem, Fit& fit) {
   constexpr int kMaxRounds = 40;
   const double limit = kChi2Quantile * fit.scale;
@@ -400,7 +401,7 @@ double Fit::correlation(Index i, Index j) const {
 
 Fit fit(const FitProblem& problem, bool is_scaled) {
   constexpr int kMaxStarts = 4;
-  constexpr double kSmallerChi2 = 1e-4;  // less is the same minimum
+  constexpr double kSmallerChi2 = 1e-4;  // minima that differ by less are the same
   problem.check();
   if (is_scaled && problem.measured.size() == index_of(problem.unknowns.size())) {
     throw InputError("the deviations can be scaled only with more measured numbers than unknowns");

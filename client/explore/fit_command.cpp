@@ -73,7 +73,7 @@ struct FitFlags {
 
 // ---- The paper's numbers ----
 
-/// Takes the mesh from the flags; throws InputError for any other flag of points.
+/// Returns the preset of --from with the mesh of the flags. Throws InputError for other flags.
 solver::ModelParameters paper_start(const FitFlags& flags) {
   constexpr const char* kMesh = "elements_per_link";
   PointFlags points = flags.points;
@@ -162,7 +162,7 @@ Unknown unknown_of_flag(const std::string& text) {
   }
 }
 
-/// Of 1%; 0 for no text.
+/// Returns 0.01 for the text 1%, and 0 for an empty text.
 double relative_deviation(std::string_view text) {
   const auto percent = solver::number_of(text.substr(0, text.find('%')));
   if (!text.empty() && !(text.ends_with('%') && percent > 0.0 && std::isfinite(*percent))) {
@@ -172,7 +172,7 @@ double relative_deviation(std::string_view text) {
   return percent.value_or(0.0) / 100.0;
 }
 
-/// What is fitted, and how its points are made.
+/// A fit to measurements, with the model and the conditions of its points.
 struct MeasuredFit {
   Measurements measured = {};
   FitProblem problem = {};
@@ -181,8 +181,8 @@ struct MeasuredFit {
   std::vector<std::pair<std::string, std::vector<double>>> conditions = {};
 };
 
-/// Adds the model and the conditions. Columns and unknowns join the flags with one of their values,
-/// so that everything is checked as flags are.
+/// Adds the model and the conditions. Adds a value of each column and unknown to the flags, so that
+/// they are checked like flags.
 void add_flags(MeasuredFit& fit, PointFlags points, const ReachCheck& check_reach) {
   const auto given = points.axes;
   const auto add = [&](const std::string& key, double value) {
@@ -236,7 +236,7 @@ MeasuredFit measured_fit(const FitFlags& flags, const ReachCheck& check_reach) {
   return fit;
 }
 
-/// All rows of measurements with each parameter vector.
+/// Returns the points of all rows of measurements for one parameter vector after another.
 protocol::Block block_of(const MeasuredFit& fit, const std::vector<VectorXd>& points) {
   std::vector<std::string> keys;
   std::vector<std::vector<double>> values;
@@ -257,7 +257,7 @@ protocol::Block block_of(const MeasuredFit& fit, const std::vector<VectorXd>& po
   return listed_points(keys, values);
 }
 
-/// The measured numbers among the rows of results of such a block.
+/// Returns the predictions of the measured numbers from the results of a block of `block_of`.
 std::vector<VectorXd> predictions_of(const Measurements& measured, const protocol::Table& results) {
   std::vector<VectorXd> predictions;
   for (std::size_t first = 0; first < results.rows.size(); first += measured.rows) {
@@ -271,7 +271,7 @@ std::vector<VectorXd> predictions_of(const Measurements& measured, const protoco
   return predictions;
 }
 
-/// All that determines the points, for the name of the study.
+/// All settings that determine the points. Their digest becomes part of the study's name.
 std::string settings_of(const MeasuredFit& fit, const FitFlags& flags) {
   auto text = fmt::format("{} {} {} {}", protocol::canonical_model(fit.model), flags.is_scaled,
                           fmt::join(flags.fit, " "), fmt::join(fit.measured.outputs, " "));
@@ -286,7 +286,7 @@ std::string settings_of(const MeasuredFit& fit, const FitFlags& flags) {
 
 // ---- Answer ----
 
-/// What the data do not determine, in sentences.
+/// Returns sentences about the unknowns that the data do not determine.
 std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fit& fit) {
   std::vector<std::string> notes;
   for (const auto& [numbers, is_undetermined] : fit.combinations) {
@@ -344,7 +344,7 @@ protocol::Table table_of_residuals(const Measurements& measured, const FitStep& 
   return table;
 }
 
-/// For each output its fitted over its measured values, and the residuals of all.
+/// Plots fitted over measured values in a panel per output, and all residuals in another panel.
 plot::Figure figure_of(const Measurements& measured, const FitStep& minimum) {
   using Mark = plot::Curve::Mark;
   plot::Figure figure{.title = fmt::format("Fit with chi2 = {}", readable_number(minimum.chi2, 4)),

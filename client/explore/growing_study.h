@@ -74,7 +74,7 @@ class GrowingStudy {
   protocol::StopSignals& stop_;
   std::string name_;
   bool no_reuse_;
-  std::unique_ptr<EmbeddedService> service_;  ///< null: the server of --server
+  std::unique_ptr<EmbeddedService> service_;  ///< null if --server names the server
   std::unique_ptr<Connection> connection_;
   protocol::Recipe recipe_;    ///< the rounds so far
   protocol::Recipe stored_;    ///< the study that the server had at the start

@@ -12,7 +12,7 @@
 namespace oblique::client {
 namespace {
 
-/// Maximum halvings of a cell: the first if its rim has two crossings, the second if it has more.
+/// A cell may be halved kHalvings times if its rim has two crossings, kMaxHalvings times if more.
 constexpr std::uint32_t kHalvings = 2;
 constexpr std::uint32_t kMaxHalvings = 4;
 
@@ -50,7 +50,7 @@ struct Crossing {
   int before;           ///< region at a
   int after;            ///< region at b
   std::uint32_t width;  ///< distance from a to b, in steps of the lattice
-  double way;           ///< of the middle along the rim, from the lower left corner, in steps
+  double way;           ///< way along the rim from the lower left corner to the middle, in steps
 
   Position middle() const { return {(a.x + b.x) / 2.0, (a.y + b.y) / 2.0}; }
   BorderVertex vertex() const {
@@ -64,7 +64,7 @@ struct Crossing {
 struct Chord {
   Crossing a;
   Crossing b;
-  int region;  ///< to the right of the chord, in the part that no earlier chord cuts off
+  int region;  ///< region right of the chord, except for parts that earlier chords cut off
   bool meets_others = false;
 };
 
@@ -97,8 +97,8 @@ class BorderSearch {
       }
     }
     solve();
-    // Points that are solved for a cell can show borders on the rims of its neighbours, so all
-    // cells are refined again until none changes.
+    // Points that are solved for a cell can show borders on the rims of its neighbours. Therefore
+    // all cells are refined again until no cell changes.
     for (bool is_refined = true; is_refined;) {
       is_refined = false;
       for (auto active = std::exchange(cells_, {}); !active.empty();) {
@@ -199,16 +199,16 @@ class BorderSearch {
   std::set<std::uint64_t> requested_;               ///< keys of points
 };
 
-/// Marching squares for any number of regions. The crossings cut the rim into parts. A chord cuts
-/// off the shortest part whose two neighbours have the same region, until there is none. If borders
-/// remain, there are at least three. They meet in a crossing that does not bound the shortest part,
-/// so that a sliver keeps both sides.
+/// Marching squares for any number of regions. The crossings divide the rim into parts. While a
+/// part has two neighbours of the same region, a chord cuts off the shortest such part. At the end
+/// no crossing or at least three remain. In the latter case chords join one crossing to all others.
+/// This crossing is not an end of the shortest part, so that a sliver keeps both sides.
 Inside BorderSearch::inside_of(const Cell& cell) const {
   auto open = crossings_of(cell);
   Inside inside{.rest = open.empty() ? regions_.at(key_of(cell.low)) : open.back().after};
   while (!open.empty()) {
     const std::size_t n = open.size();
-    // Of the part after crossing i: whether its neighbours have different regions; its length.
+    // Part after crossing i: whether the regions before and after it differ, and its length.
     std::vector<std::pair<bool, double>> parts;
     for (std::size_t i = 0; i < n; ++i) {
       const Crossing& end = open[(i + 1) % n];
@@ -307,13 +307,13 @@ Borders BorderSearch::borders() const {
 
 // ---- Shifts ----
 
-/// A vertex whose border is searched in another solution.
+/// A vertex, and the search for the border near it in another solution.
 struct Sample {
   BorderVertex vertex;
   std::size_t curve;
-  std::vector<std::uint32_t> places = {};  ///< to be solved, along the axis of the bracket
+  std::vector<std::uint32_t> places = {};  ///< requested places along the axis of the bracket
   std::uint32_t low = 0;
-  std::uint32_t high = 0;  ///< the border is between low and high; both 0: not found
+  std::uint32_t high = 0;  ///< the border is between low and high; both are 0 if not found
 
   LatticePoint point_at(std::uint32_t place) const {
     return vertex.is_along_x ? LatticePoint{place, vertex.low.y}
@@ -324,7 +324,7 @@ struct Sample {
     return std::abs((from + (to - 1.0)) / 2.0 - vertex.place());
   }
 
-  /// Requests both ends of the vertex' bracket, and places further and further from it.
+  /// Requests the ends of the vertex's bracket, and places at increasing distances from it.
   void look_around(const MapGrid& grid) {
     const std::uint32_t place = vertex.place();
     std::set<std::uint32_t> around{place, place + 1};
@@ -334,8 +334,8 @@ struct Sample {
     }
     places.assign(around.begin(), around.end());
   }
-  /// Narrows the bracket and requests its middle. The first call chooses, of the borders
-  /// between the vertex's two regions, the nearest one.
+  /// Narrows the bracket and requests its middle. The first call chooses the bracket around the
+  /// nearest border between the vertex's two regions.
   void narrow(std::span<const int> regions_of_places) {
     if (places.size() == 1) {
       (regions_of_places[0] == vertex.from ? low : high) = places[0];

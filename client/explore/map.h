@@ -29,7 +29,7 @@ struct MapGrid {
 /// Returns the region of each point, a number from 0.
 using RegionsOf = std::function<std::vector<int>(const std::vector<LatticePoint>& points)>;
 
-/// A point of a border. Its bracket is the step of the lattice from `low` along one axis.
+/// A place where a border crosses a step of the lattice, called its bracket, which starts at `low`.
 struct BorderVertex {
   LatticePoint low;
   bool is_along_x = true;  ///< else along y
@@ -58,7 +58,7 @@ struct Borders {
 /// An island or sliver that contains no point of the grid is missed, unless a bisection meets it.
 Borders find_borders(const MapGrid& grid, const RegionsOf& regions_of);
 
-/// Distances of a curve's vertices from the border of the same regions in another solution.
+/// Distances of a curve's vertices from the border between the same regions in another solution.
 struct CurveShift {
   std::size_t checked = 0;  ///< vertices
   std::size_t lost = 0;     ///< vertices without such a border within 1/8 of the axis

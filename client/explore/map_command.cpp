@@ -124,7 +124,7 @@ std::string sql_of_region(const std::string& of) {
   return fmt::format("CASE {} {} END", side(">"), side("<="));
 }
 
-/// Returns SQL for the region of a point and, with --over, for that output. Throws InputError.
+/// Returns SQL for the region of a point and, if given, the output of --over. Throws InputError.
 std::string columns_of(const MapFlags& flags) {
   std::string columns = sql_of_region(flags.of);
   if (!flags.over.empty()) {
@@ -298,7 +298,7 @@ FoundMap find_map(const MapFlags& flags, const MapPlane& plane, GrowingStudy& st
   FoundMap map{flags, plane, study};
   std::map<std::string, int> numbers;
   const auto solve = [&](const std::vector<LatticePoint>& points, int elements_per_link) {
-    constexpr std::uint32_t kOtherRounds = 50;  // estimate for halved cells and the finer mesh
+    constexpr std::uint32_t kOtherRounds = 50;  // estimate: rounds for halved cells and finer mesh
     const bool is_coarse_grid = study.rounds() == 0;
     const auto table = study.solve(plane.block_of(points, elements_per_link), plane.columns,
                                    fmt::format("round {} of about {}", study.rounds() + 1,

@@ -40,7 +40,7 @@ bool is_deviation(const CsvFile& file, std::string_view name) {
          has_column(file, name.substr(0, name.size() - kDeviation.size()));
 }
 
-/// The key of a column, which queries call E_Pa for E; empty: none.
+/// Returns the key that a column contains, or an empty text. The column of the key E is E_Pa.
 std::string key_of_column(const std::string& name) {
   if (name == server::column_of_key("E")) {
     return "E";

@@ -40,26 +40,27 @@ struct Sensitivity {
   std::uint64_t dropped = 0;  ///< rows with a value that is not finite
 };
 
-/// Sobol' indices `first` (S_i) and `total` (S_Ti) of the output with these values at the points of
-/// rows 0, 1, ... of Saltelli's design. M. J. W. Jansen, Analysis of variance designs for model
-/// output, Comput. Phys. Commun. 117 (1999); A. Saltelli et al., Variance based sensitivity
+/// Sobol' indices `first` (S_i) and `total` (S_Ti) of an output. `values` are the output at the
+/// points of rows 0, 1, ... of Saltelli's design. M. J. W. Jansen, Analysis of variance designs for
+/// model output, Comput. Phys. Commun. 117 (1999); A. Saltelli et al., Variance based sensitivity
 /// analysis of model output, Comput. Phys. Commun. 181 (2010), table 2 (c) and (f):
 ///
 ///   S_i  = 1 - sum_n (f(B) - f(A_B^i))^2 / (2 N V)
 ///   S_Ti =     sum_n (f(A) - f(A_B^i))^2 / (2 N V)
 ///
-/// V is the variance of all f(A) and f(B); without variance or two rows the indices are undefined.
-/// The ends of intervals are the 2.5 % and 97.5 % percentiles of 1,000 replicates, each of which
-/// draws as many rows with replacement (B. Efron and R. J. Tibshirani, An Introduction to the
-/// Bootstrap, 1993). They assume independent rows and are too wide for Sobol points.
+/// V is the variance of all f(A) and f(B). If V is 0 or there are fewer than two rows, the indices
+/// are undefined. The ends of intervals are the 2.5 % and 97.5 % percentiles of 1,000 bootstrap
+/// replicates (B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap, 1993). The
+/// intervals assume independent rows, so they are too wide for Sobol points.
 Sensitivity sobol_indices(std::span<const double> values, std::size_t inputs, std::uint64_t seed);
 
-/// Measures of the elementary effects of each input on the output with these values at the points
-/// of rows 0, 1, ... of Morris' design: `mu_star`, the mean of their magnitudes (F. Campolongo, J.
-/// Cariboni and A. Saltelli, An effective screening design for sensitivity analysis of large
-/// models, Environ. Model. Softw. 22 (2007)), `sigma`, their standard deviation, and `mu`, their
-/// mean. An effect is the change of the output over the change of the coordinate. Intervals as
-/// those of `sobol_indices`; undefined for fewer than two rows. `seed` is that of the design.
+/// Measures of the elementary effects of each input on an output. `values` are the output at the
+/// points of rows 0, 1, ... of Morris' design, which was drawn with `seed`. An elementary effect is
+/// the change of the output divided by the change of the coordinate. `mu_star` is the mean of the
+/// effects' magnitudes (F. Campolongo, J. Cariboni and A. Saltelli, An effective screening design
+/// for sensitivity analysis of large models, Environ. Model. Softw. 22 (2007)), `sigma` their
+/// standard deviation, and `mu` their mean. Intervals are as in `sobol_indices`. Fewer than two
+/// rows leave the measures undefined.
 Sensitivity morris_effects(std::span<const double> values, std::size_t inputs, std::uint64_t seed);
 
 }  // namespace oblique::client

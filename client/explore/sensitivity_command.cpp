@@ -84,7 +84,7 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
     throw error.fields().key == "sample" ? solver::InputError(kNothingDrawn) : error;
   }
   protocol::Block& block = *problem.sample.mutable_blocks(0);
-  // The digest in the study's name depends on the kind.
+  // Always the same kind, because it changes the digest in the study's name.
   block.mutable_sample()->set_kind(protocol::SAMPLE_SOBOL);
   for (const auto& axis : block.axes()) {
     if (protocol::is_drawn(axis)) {
@@ -132,7 +132,7 @@ protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t b
 
 /// Prints a note if falls need most of the time of the points of `block`.
 void note_falls(Console& console, const SensitivityProblem& problem, const protocol::Block& block) {
-  constexpr std::uint64_t kContactsPerFall = 100;  // a fall takes at least as long, on any mesh
+  constexpr std::uint64_t kContactsPerFall = 100;  // a fall takes at least as long as 100 contacts
   protocol::Recipe recipe = problem.sample;
   *recipe.mutable_blocks(0) = block;
   const auto size = protocol::size_of(protocol::PointTable(recipe));
@@ -186,7 +186,7 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
           format_count(max_points)));
       return found;
     }
-    // The width falls as the square root of the rows.
+    // The width is proportional to 1 / sqrt(number of rows).
     const double more_rounds = std::ceil(2.0 * std::log2(half_width / interval));
     of_rounds = fmt::format(" of about {}", static_cast<double>(study.rounds()) + more_rounds);
   }

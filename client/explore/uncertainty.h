@@ -5,8 +5,8 @@
 
 #include "client/explore/estimate.h"
 
-// Statistics of independent draws, with 95 % intervals. Values are finite; what too few values do
-// not determine is NaN.
+// Statistics of independent draws, with 95 % intervals. Values are finite. A statistic that too few
+// values do not determine is NaN.
 namespace oblique::client {
 
 /// The mean, with the interval mean -+ 1.96 sd/sqrt(n), which holds for more than about 30 values.

@@ -28,7 +28,7 @@ class ProgramNotFound : public ProcessError {
 
 using protocol::Descriptor;
 
-/// A pipe. A child process inherits an end only as `handed_over`.
+/// A pipe. A child process inherits only an end that ChildSettings names.
 struct Pipe {
   Pipe();  ///< Throws ProcessError.
   Descriptor read;
@@ -38,24 +38,24 @@ struct Pipe {
 struct ChildSettings {
   std::filesystem::path program;       ///< a name without a slash is searched for in PATH
   std::vector<std::string> arguments;  ///< arguments after the program's name
-  bool show_errors = false;            ///< sends standard error to ours; otherwise keeps the text
+  bool show_errors = false;            ///< standard error goes to ours; otherwise its text is kept
   int handed_over = -1;                ///< descriptor that becomes the child's kHandedOver
   bool keep_output = false;            ///< keeps standard output separately from standard error
   std::string hidden_variables{};      ///< prefix of environment variables to hide; empty: none
-  std::optional<std::string> input{};  ///< text for standard input; nothing: empty input
+  std::optional<std::string> input{};  ///< text for standard input; without it the input is empty
   bool stays_in_our_group = false;     ///< the child receives our group's signals
   int input_from = -1;                 ///< descriptor that becomes the child's standard input
   bool show_output = false;            ///< the child writes to our standard output
 };
 
 /// A child process, killed and reaped by the destructor. By default it has its own process group:
-/// Ctrl-C on the terminal then reaches only our process, which ends the child in order.
+/// Ctrl-C on the terminal then reaches only our process, which stops the child.
 class ChildProcess {
  public:
   /// Number that the descriptor `ChildSettings::handed_over` has in the child.
   static constexpr int kHandedOver = 3;
 
-  /// Throws ProcessError, which names the program, if it cannot be started.
+  /// Throws ProcessError, which names the program, if the program cannot be started.
   explicit ChildProcess(const ChildSettings& settings);
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;

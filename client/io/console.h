@@ -49,13 +49,13 @@ std::string format_bytes(std::uint64_t bytes);
 enum class Verbosity {
   kQuiet,   ///< data and errors
   kNormal,  ///< data, errors, progress and notes
-  kVerbose  ///< everything, with actions, places and durations
+  kVerbose  ///< also what the command does, where, and how long it takes
 };
 
 /// Output streams of a command, its verbosity, and the terminal behind the error stream.
 class Console {
  public:
-  /// Features of the terminal behind the error stream; the defaults are those of a file.
+  /// Features of the terminal behind the error stream. By default the stream is a file.
   struct Terminal {
     bool is_terminal = false;  ///< a line can be overwritten
     bool has_colours = false;

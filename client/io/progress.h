@@ -94,7 +94,7 @@ class StatusLine {
   Console& console_;
   Settings settings_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  std::mutex mutex_;  ///< guards the parts, the console and the flag
+  std::mutex mutex_;  ///< guards parts_, console_ and is_drawn_
   std::list<Describe> parts_;
   bool is_drawn_ = false;
   std::condition_variable_any stopped_;

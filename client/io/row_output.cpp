@@ -72,7 +72,7 @@ struct FilePlace {
 };
 
 FilePlace file_place(const std::string& path, std::string_view flag) {
-  constexpr int kMaxLinks = 40;  // the maximum that Linux follows
+  constexpr int kMaxLinks = 40;  // maximum number of links that Linux follows
   FilePlace place{path};
   std::error_code ignored;
   for (int links = 0; fs::is_symlink(fs::symlink_status(place.path, ignored)); ++links) {
@@ -269,8 +269,8 @@ void StandardOutput::start_pager() {
       .input_from = pipe.read.number(),
       .show_output = true});
   to_pager_ = std::move(pipe.write);
-  // Writing fails once the user has quit the pager; without SIGPIPE this is an error code. Ctrl-C
-  // goes to the pager.
+  // Ignores SIGPIPE, so that writing after the user has quit the pager returns an error. Ignores
+  // Ctrl-C, which goes to the pager.
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGINT, SIG_IGN);
 }

@@ -32,7 +32,7 @@ struct PublishedCase : CaseNumbers {
   double e_star;
   std::string read;  ///< place in the paper, such as a table
 
-  /// Whether the given values are those of this case, up to rounding in decimal text.
+  /// Whether this case has the given values, up to rounding in decimal text.
   bool is_at(double H, double friction, double e) const;
 };
 

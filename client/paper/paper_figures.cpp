@@ -124,7 +124,7 @@ Panel group_panel(const PaperGroup& group, const PanelPlan& plan) {
     longest_s = std::max(longest_s, t_s);
   }
   add_if_any(panel, std::move(published));
-  panel.x = plot::time_axis(1.03 * longest_s);  // leaves room for marks at the end of a curve
+  panel.x = plot::time_axis(1.03 * longest_s);  // leaves room for a diamond at a curve's end
   panel.y = {.label = plan.label, .name = plan.name, .per_unit = plan.per_unit};
   plot::fit(panel.y, panel.curves, &Curve::y);
   return panel;

@@ -60,8 +60,8 @@ std::vector<double> round_edges(const Range& range, double bins) {
   std::vector<double> edges;
   for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
        ++i) {
-    // For steps below 1, divides two integers. The quotient is the same double as the decimal that
-    // a user types.
+    // If the step is below 1, an edge is the quotient of two integers. It equals the double of its
+    // decimal text, which a user may type.
     edges.push_back(step < 1.0 ? i / std::round(1.0 / step) : i * step);
   }
   return edges;
@@ -181,7 +181,7 @@ namespace {
 using protocol::CellKind;
 constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 
-/// Index of the cell that contains (x, y) of each row; SIZE_MAX if no cell does.
+/// For each row, the index of the cell that contains its (x, y); SIZE_MAX if no cell does.
 std::vector<std::size_t> places_in(const Cells& cells, const Answer& answer) {
   std::vector<std::size_t> places;
   for (std::size_t row = 0; row < answer[0].numbers.size(); ++row) {
@@ -284,7 +284,7 @@ std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn
   });
   of_study.insert(of_study.end(), others.begin(), others.end());
   std::sort(of_study.begin(), of_study.end());
-  // A value computed on another machine may differ in its last bit.
+  // Merges values that differ only because different machines computed them.
   const auto end = std::unique(of_study.begin(), of_study.end(), [](double a, double b) {
     return std::abs(b - a) <= 1e-12 * std::abs(b);
   });

@@ -52,7 +52,7 @@ std::string shown_value(const FigureAxis& axis, double value);
 struct Curve {
   /// kBorder is always a dark line, whatever `stroke` is.
   enum class Mark { kLine, kLineAndMarks, kDots, kDiamonds, kBorder };
-  std::string name = {};  ///< entry in the key; empty: no entry
+  std::string name = {};  ///< entry in the legend; no entry if empty
   std::vector<double> x = {};
   std::vector<double> y = {};
   std::size_t stroke = 0;         ///< index of the colour, dash pattern and mark
@@ -112,7 +112,7 @@ struct Bars {
   std::vector<double> edges = {};
   std::vector<double> heights = {};
   std::vector<std::string> names = {};
-  std::vector<Range> intervals = {};  ///< error bars of named bars; NaN or empty: none
+  std::vector<Range> intervals = {};  ///< error bars of named bars, if any; NaN leaves one out
 };
 
 /// Counts values in bins. All bins have the same round width or, on a logarithmic axis, the same
@@ -152,8 +152,8 @@ struct Figure {
 /// Edges halfway between ascending values; a single value gets a margin.
 std::vector<double> edges_between(const std::vector<double>& values, bool is_logarithmic);
 
-/// Index of the interval between ascending edges that contains the value. An edge belongs to the
-/// interval above it, the last edge to the last interval. SIZE_MAX: no interval contains it.
+/// Index of the interval between ascending edges that contains the value; SIZE_MAX if there is
+/// none. An edge belongs to the interval above it, the last edge to the last interval.
 std::size_t interval_of(const std::vector<double>& edges, double value);
 
 struct AnswerColumn {
@@ -188,7 +188,7 @@ Answer read_columns(RowStream& stream);
 CellAxis cells_around(const std::vector<double>& values, bool is_logarithmic);
 CellAxis cells_between(const FigureAxis& axis, std::size_t cells);
 
-/// Values along an axis of cells: those of the study (ascending) and others that the rows contain.
+/// Ascending values along an axis: those `of_study`, which are ascending, and others in the rows.
 std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column);
 
 struct Gathered {
@@ -208,7 +208,7 @@ Gathered gathered_in(const Answer& answer, const CellAxis& x, const CellAxis& y)
 void mark_filtered(Cells& cells, const Answer& answer);
 
 struct GatheredLines {
-  std::vector<Curve> curves = {};     ///< lines, each with its value of `by`
+  std::vector<Curve> curves = {};     ///< one line per value of the column that distinguishes lines
   std::uint64_t gaps = 0;             ///< number of gaps
   std::uint64_t most_at_a_place = 0;  ///< maximum number of rows with a value at one x of a line
 };

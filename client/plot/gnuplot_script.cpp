@@ -69,7 +69,7 @@ constexpr std::array<std::string_view, 5> kMarks{
     "lines ls {}", "linespoints ls {}", "points ls {} pt 7 ps 0.4", "points ls {} pt 12 ps 1.0",
     "lines lc rgb '#202428' dt solid lw 1.5"};
 
-// Sizes of text in pixels. On a terminal one character has the width of a letter.
+// Sizes of text in pixels. A character of a terminal is kLetter wide and kLine high.
 constexpr double kLetter = 6.5;  // average width of a letter, rounded up
 constexpr double kLine = 17.0;
 constexpr double kTitle = 22.0;
@@ -80,13 +80,13 @@ struct Kind {
   std::uint32_t colour;
   int pattern;           ///< gnuplot's number of the pattern; 0: none
   std::string_view ink;  ///< colour of the pattern
-  char letter;           ///< on terminals; pictures show only capitals
+  char letter;           ///< mark on terminals; in pictures only if it is a capital
   std::string text;      ///< name in the legend
-  std::uint64_t count;   ///< number of points or cells
+  std::uint64_t count;   ///< number of points or cells of this kind
 
   bool has_capital() const { return std::isupper(static_cast<unsigned char>(letter)) != 0; }
 };
-constexpr int kNoKind = -1;  // the cell has a number or is blank
+constexpr int kNoKind = -1;  // for a cell that has a numeric value or is blank
 
 /// Returns the categories, followed by the kinds no result, excluded and failed.
 std::vector<Kind> kinds_of(const Cells& cells) {
@@ -385,7 +385,7 @@ class Script {
     const double lines = is_below ? std::ceil(static_cast<double>(titles_.size()) / columns) : 0.0;
     add("set key {} maxcols {}\n",
         !is_below  ? "rmargin top vertical"
-        : is_text_ ? "bmargin left horizontal"  // width -1 makes letters overlap
+        : is_text_ ? "bmargin left horizontal"  // width -1 makes letters overlap on a terminal
                    : "bmargin left horizontal width -1",
         is_below ? columns : 1.0);
     if (!is_alone || lines > 0.0) {
@@ -408,7 +408,7 @@ class Script {
     write_axis("x", panel.x);
     FigureAxis y = panel.y;
     if (is_text_ && figure_.panels.size() > 1) {
-      y.label.clear();  // the label would cover numbers
+      y.label.clear();  // the label would cover the numbers of the ticks
     }
     write_axis("y", y);
     for (const Span& span : panel.spans) {
@@ -536,7 +536,7 @@ class Script {
   void write_characters(const Panel& panel, const std::vector<Kind>& kinds) {
     constexpr std::string_view kLightToDark = ".:-=+*%#@";
     const Cells& cells = *panel.cells;
-    // The raster has one part per character of the terminal; more would overwrite each other.
+    // The raster has one part per character of the terminal; more parts would overwrite each other.
     const auto raster = raster_of(panel, static_cast<std::size_t>(size_.width / kLetter),
                                   static_cast<std::size_t>(size_.height / kLine));
     const auto data = begin_data();
@@ -693,7 +693,7 @@ class Script {
     double left, bottom, width, height;
   } frame_{};                        // position of the panel, from the upper left corner
   std::vector<std::string> titles_;  // titles in the key of the panel
-  bool has_span_key_ = false;        // only one panel's key names the spans
+  bool has_span_key_ = false;        // a panel's key already names the spans
   std::string out_;
   std::vector<std::string> plots_;  // elements of the panel's plot command
   int blocks_ = 0;
