@@ -28,7 +28,7 @@ std::string encode_around(const google::protobuf::MessageLite& rest, int number,
                           std::string_view encoded);
 
 /// Parses one frame, which may be malicious. Returns false if the frame is too long, truncated or
-/// not of this type. The caller must check that a known kind is set.
+/// not of this type. The caller must check that the message has a kind which this version knows.
 bool decode(std::string_view frame, google::protobuf::MessageLite& message);
 
 /// Stops Protobuf from logging each frame that it cannot parse, because a peer could fill the log.

@@ -18,8 +18,8 @@ PictureFormat picture_format(const std::string& name, const std::string& file);
 
 std::vector<std::string_view> picture_format_names();
 
-/// Renders the figure in a format, in its default size unless one is given. All formats but CSV and
-/// script need gnuplot: throws std::runtime_error if it is missing, fails or takes too long.
+/// Renders the figure in `format` and in `size` (default: own_size). All formats but CSV and script
+/// need gnuplot: throws std::runtime_error if it is missing, fails or takes too long.
 std::string picture_of(const Figure& figure, PictureFormat format,
                        const std::optional<Size>& size = {});
 
@@ -59,7 +59,7 @@ std::string script_for_terminal(const Figure& figure, std::size_t columns, std::
 
 /// Quotes a text for gnuplot with single quotes, so that gnuplot expands nothing in it. Makes
 /// control characters visible. Replaces apostrophes by typographic ones, because gnuplot 5.4
-/// misreads a doubled apostrophe at the beginning.
+/// misreads a doubled apostrophe at the beginning of a text.
 std::string gnuplot_text(std::string_view text);
 
 }  // namespace oblique::client::plot

@@ -64,8 +64,7 @@ StudyShape shape_of_block(const protocol::Recipe& recipe, std::size_t number,
   return shape;
 }
 
-/// Returns the shape of the study with the axes of all blocks. Each axis has its values in all
-/// blocks.
+/// Returns the shape for a picture of all blocks: each axis has its values from all blocks.
 StudyShape with_all_blocks(StudyShape shape, const protocol::Recipe& recipe) {
   shape.is_one_block = false;
   for (const Block& block : recipe.blocks()) {
@@ -99,14 +98,14 @@ double nearest_value(const StudyAxis& axis, double wanted) {
   });
 }
 
-/// Whether a typed value means `value` of an axis. A value typed from a table, which shows six
-/// digits, must match.
+/// Whether a typed value means `value` of an axis. The user may have typed it from a table, which
+/// shows six digits.
 bool means(double typed, double value) {
   return std::abs(value - typed) <= 1e-5 * std::abs(typed);
 }
 
 /// Whether the picture can show this block alone: the requested axes vary in the block, the block
-/// has the values of --at, and enough axes are not fixed.
+/// has the values of --at, and enough axes for the picture vary and are not fixed by --at.
 bool suits(const StudyShape& shape, const PlotRequest& request) {
   for (const std::string& name : {request.x, request.y, request.by}) {
     const StudyAxis* axis = shape.find(name);
@@ -205,9 +204,9 @@ std::string without_spaces(std::string_view text) {
              : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
 }
 
-/// Chooses lines instead of a map if two axes are open and one of them has few values. Cells of a
-/// map would then extend over values that the study does not have. Returns the axis along which the
-/// lines run, or nullptr if a map is better.
+/// Chooses lines instead of a map if only two axes vary and are not fixed (`open`), and one of them
+/// has few values: cells of a map would extend over values that the study does not have. Returns
+/// the axis along which the lines run, or nullptr if a map is better.
 const StudyAxis* axis_of_few_lines(const std::vector<const StudyAxis*>& open) {
   constexpr std::size_t kFew = 3;
   if (open.size() != 2 || !open[0]->is_listed || !open[1]->is_listed ||

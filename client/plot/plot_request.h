@@ -80,17 +80,16 @@ struct StudyShape {
   std::vector<std::string_view> keys() const;
 };
 
-/// Reads the structure of the study. If the study has several blocks, a map or lines show one of
-/// them: the block of `--block`, else the block with the most points that has the requested axes
-/// and values. The picture shows all blocks with `--block all`, if no suitable block is a grid,
-/// and, without --block, if it shows points or a histogram. Throws solver::InputError for an
-/// unknown block and for a recipe without points.
+/// Returns the structure of the block of --block. Without --block, returns that of the largest
+/// block that has the requested axes and values, if this block is a grid and the picture is a map
+/// or lines. In all other cases returns the structure of all blocks. Throws solver::InputError for
+/// an unknown block and for a recipe without points.
 StudyShape shape_for(const protocol::Recipe& recipe, const PlotRequest& request);
 
 struct ChosenAxis {
   std::string column;               ///< column in queries
   std::string name;                 ///< label
-  const StudyAxis* axis = nullptr;  ///< nullptr for a column of results
+  const StudyAxis* axis = nullptr;  ///< nullptr if `column` is not an axis
 };
 
 /// Returns the key or column that the text of a flag names. A text that is not a single word is
@@ -106,10 +105,10 @@ struct Condition {
   std::vector<std::string> said;   ///< sentences about choices
 };
 
-/// Combines --where and --at. `drawn` holds the axes of the picture. With `fixes_others`, other
-/// axes that vary are fixed at their first values, unless --at or --where names them. Throws
-/// solver::InputError for an --at with an unknown key, or with a value that the key does not have;
-/// the error gives the nearest.
+/// Combines --where and --at. `drawn` contains the axes of the picture. With `fixes_others`, each
+/// other axis that varies is fixed at its first value, unless --at or --where names it. Throws
+/// solver::InputError if an --at has an unknown key, or a value that the key does not have; the
+/// error then contains the nearest value.
 Condition condition_of(const PlotRequest& request, const StudyShape& shape,
                        const std::vector<ChosenAxis>& drawn, bool fixes_others);
 
@@ -117,9 +116,9 @@ bool where_names(const PlotRequest& request, const StudyAxis& axis);
 /// Whether an --at fixes the axis.
 bool at_holds(const PlotRequest& request, const StudyAxis& axis);
 
-/// Returns the request with a kind of picture chosen if none is requested: a map of the largest
-/// normal force for two axes; lines for one axis, or if the second has few values; single points if
-/// they are not on a grid.
+/// Returns the request. If it names no kind of picture, chooses one: a map of the largest normal
+/// force over two axes; lines for one axis, or if one of two axes has few values; single points if
+/// the study is not a grid.
 PlotRequest completed(PlotRequest request, const StudyShape& shape);
 
 /// Draws the rows of `source`. `tell` receives sentences about automatic choices. Throws the errors

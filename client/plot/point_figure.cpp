@@ -41,8 +41,9 @@ std::vector<Span> spans_of(const PointHistory& history) {
 }
 
 /// Energy [J] that the finger has transferred to the contact since touch: dissipated by friction at
-/// P, and stored or dissipated in the normal and tangential element. The trapezoidal sums over the
-/// positions of tip and P are exact for the normal element and while P sticks.
+/// the contact particle P, and stored or dissipated in the normal and tangential element. The
+/// trapezoidal sums over the positions of tip and P are exact for the normal element; those for the
+/// tangential element are exact while P sticks.
 std::pair<Curve, Curve> contact_energies(const PointHistory& history) {
   auto friction = curve_of(history, "lost to friction", 1, &TraceRow::t_s);
   auto element = curve_of(history, "in the normal and tangential element", 3, &TraceRow::t_s);
@@ -54,7 +55,7 @@ std::pair<Curve, Curve> contact_energies(const PointHistory& history) {
     const auto& before = rows[i == 0 ? 0 : i - 1];
     const double fn_N = 0.5 * (before.fn_N + row.fn_N);
     const double ft_N = 0.5 * (before.ft_N + row.ft_N);
-    // The tip does work against both forces; the work that moves P is dissipated.
+    // Work of the tip against normal and tangential force; the part that moves P is dissipated.
     const double lost_J = -ft_N * (row.xP_m - before.xP_m);
     friction_J += lost_J;
     element_J += -fn_N * (row.y_m - before.y_m) - ft_N * (row.x_m - before.x_m) - lost_J;

@@ -27,7 +27,7 @@ struct PointHistory {
   double mu = 0.0;
   double e_star = 0.0;
   std::vector<solver::TraceRow> rows = {};
-  std::optional<solver::CaseResult> result = {};  ///< empty if this version cannot read it
+  std::optional<solver::CaseResult> result = {};  ///< empty if this version cannot read the result
   std::vector<FallShape> falls = {};              ///< some shapes during the fall; may be empty
   std::vector<std::string> remarks = {};          ///< sentences below the picture
 

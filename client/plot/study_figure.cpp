@@ -25,8 +25,8 @@ using solver::readable_number;
 
 constexpr std::size_t kMaxCellsAlong = 320;  // maximum number of cells along an axis
 constexpr std::size_t kMaxCategories = 12;   // maximum number of categories in the legend
-constexpr std::size_t kMaxNamedLines = 8;    // maximum number of lines with names in the key
-constexpr std::size_t kMaxMarked = 60;       // maximum number of points on a line with marks
+constexpr std::size_t kMaxNamedLines = 8;    // maximum number of lines that the legend names
+constexpr std::size_t kMaxMarked = 60;       // lines with more points have no marks
 constexpr std::size_t kMaxDots = 4000;       // maximum number of points drawn one by one
 constexpr std::size_t kMaxNames = 16;        // maximum number of bars for texts
 
@@ -77,7 +77,7 @@ Bars bars_of_names(const AnswerColumn& column) {
   }
   for (const std::uint32_t word : column.word_of_row) {
     if (word != AnswerColumn::kNoWord) {
-      counts[word].first -= 1.0;  // negative counts sort the largest first
+      counts[word].first -= 1.0;  // counts are negative, so that the largest is sorted first
     }
   }
   std::sort(counts.begin(), counts.end());
@@ -219,7 +219,7 @@ class FigureBuilder {
 
   // ---- Maps -------------------------------------------------------------------------------------
 
-  /// Values along an axis of cells; empty if each cell groups several values.
+  /// Values on an axis of a map, one for each cell; empty if a cell groups several values.
   std::vector<double> cell_values(const ChosenAxis& axis, const AnswerColumn& column) const {
     if (!shape_.is_grid || axis.axis == nullptr || !axis.axis->is_listed) {
       return {};

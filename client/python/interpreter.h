@@ -59,10 +59,10 @@ void refuse_forked_child();
 /// Thrown by work that was stopped.
 class Stopped {};
 
-/// Runs `work` on its own thread without the interpreter's lock and returns its result. Every 50 ms
-/// it handles signals and calls `meanwhile`. If one of these raises an exception, as Ctrl-C does,
-/// it sets `stop`, calls `when_stopped` and soon throws the exception. `work` may still run at that
-/// time, so it must own all data that it uses.
+/// Runs `work` on its own thread without the interpreter's lock and returns its result. The calling
+/// thread handles signals and calls `meanwhile` every 50 ms. If a signal (Ctrl-C) or `meanwhile`
+/// raises an exception, sets `stop`, calls `when_stopped` and soon throws the exception. `work` may
+/// still run at that time, so it must own all data that it uses.
 template <class Result>
 Result interruptibly(const std::function<Result(const std::atomic<bool>& stop)>& work,
                      const std::function<void()>& when_stopped = {},

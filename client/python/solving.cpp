@@ -70,9 +70,9 @@ class ResultArrays {
   /// The elements of one list for many points, in the order in which the points arrive.
   struct Elements {
     const solver::ResultList* list;
-    std::vector<std::uint64_t> begin;  ///< index of each point's first element
+    std::vector<std::uint64_t> begin;  ///< for each point, the index of its first element
     std::vector<std::uint32_t> count;
-    /// One per member. A text is stored as the index of its first occurrence in `texts`.
+    /// Values of each member. A text is stored as its index in `texts`.
     std::vector<std::vector<double>> members;
     std::vector<std::string> texts;
   };
@@ -234,9 +234,9 @@ std::vector<double> values_of(std::string_view key, const py::handle& array) {
   return numbers;
 }
 
-/// Adds a key. A single number of a model key goes to `model`. Everything else goes to `axes`, by
-/// key_number: a number of a point key or link, a text (expression), or an array with one value per
-/// point.
+/// Adds the key `name`. A single number goes to `model` if the key belongs to the model. Other
+/// values go to axes[key_number(name)]: a number of a point key or of a link, a text (expression),
+/// or an array with one value per point.
 void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>& axes,
              const std::string& name, const py::handle& value) {
   const std::size_t number = protocol::key_number(name);
@@ -261,7 +261,7 @@ void add_key(protocol::ModelInput& model, std::map<std::size_t, protocol::Axis>&
   axes[number] = std::move(axis);
 }
 
-/// Adds the model with these values of `keys`, or the model's error.
+/// Adds the model `base` with `values` for `keys`, or the error of this model.
 void add_model(GivenPoints& all, std::span<const double> values,
                const std::vector<std::size_t>& keys, const ModelParameters& base) {
   std::string fault;
@@ -337,11 +337,11 @@ GivenPoints points_of(const py::dict& keys, std::size_t points) {
   }
   protocol::Block block = protocol::block_of(std::move(axes));
   block.set_zip(true);
-  // The index of each model, by the bits of its values.
+  // Index of each model, by the bits of its values: as a number, NaN would not equal itself.
   std::map<std::vector<std::uint64_t>, std::size_t> known;
   all.points.reserve(points);
   const auto add = [&](std::span<const double> values) {
-    std::vector<std::uint64_t> bits;  // not numbers, because NaN does not equal itself
+    std::vector<std::uint64_t> bits;
     for (std::size_t j = 0; j < model_keys.size(); ++j) {
       bits.push_back(std::bit_cast<std::uint64_t>(values[j]));
     }
@@ -401,7 +401,7 @@ py::dict solve(const Falls& falls, const py::dict& keys, bool errors) {
   return dict_of(one, result);
 }
 
-/// Instants of a trace: the values of each instant, and its state.
+/// The result of a point, and the numbers and the state of each instant of its trace.
 struct Instants {
   CaseResult result;
   std::vector<double> numbers;

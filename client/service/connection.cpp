@@ -39,8 +39,8 @@ protocol::DealerSettings dealer_settings(const ConnectionSettings& settings) {
           .key = settings.key};
 }
 
-/// Returns the first item of the next page, or 0 after the last page. Also returns 0 if the answer
-/// does not advance, because otherwise the caller's loop would never end.
+/// Returns the number after which the next page begins, or 0 after the last page. Also returns 0 if
+/// this number is not above the requested one, because the caller's loop would never end.
 std::uint64_t next_page(std::uint64_t requested, std::uint64_t answered) {
   return answered > requested ? answered : 0;
 }

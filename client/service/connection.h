@@ -30,7 +30,7 @@ struct ConnectionSettings {
   /// Time after which an unanswered request is sent again over a new connection; the time doubles
   /// with each repetition.
   std::int64_t resend_after_ms = 3'000;
-  std::optional<protocol::KeyFile> key = {};  ///< our key; nothing: the connection is not encrypted
+  std::optional<protocol::KeyFile> key = {};  ///< our key; without one, messages are not encrypted
   /// Advice if the server does not answer. If empty, the error says that the server may not run.
   std::string if_silent = {};
 };
@@ -64,9 +64,9 @@ struct SubmitSettings {
 /// reply with the same number. Throws ServerError, ConnectionError, Interrupted, or
 /// solver::InputError if the server reports a wrong request. Requests are idempotent: a request
 /// without an answer, or lost because the server died, is sent again, and the first answer counts.
-/// A call with a `tell` has no timeout: it reports once that the server is silent and once that the
-/// server answers again. Such a call ends only if the server rejects this program, for example its
-/// key.
+/// A call with a `tell` has no timeout: it calls `tell` once when the server is silent and once
+/// when the server answers again. It waits until the server answers or rejects this program, for
+/// example because of the key.
 class Connection : public Source {
  public:
   /// Called many times a second during a wait. The wait ends if it returns false or throws.
@@ -110,7 +110,7 @@ class Connection : public Source {
   /// Progress of an answer in chunks that is not yet complete.
   struct Rows {
     protocol::QueryRequest request;
-    Tell tell = {};                ///< reports waiting for the first chunk
+    Tell tell = {};                ///< receives messages during the wait for the first chunk
     std::uint64_t request_id = 0;  ///< valid after the first chunk
     std::uint64_t connection = 0;  ///< connection that delivers the answer
     std::uint64_t chunks = 0;      ///< chunks received
@@ -121,12 +121,12 @@ class Connection : public Source {
   struct Outstanding {
     std::string frame;
     std::chrono::milliseconds resend_after;  ///< since `sent`
-    /// Time of the server's last message; initially the start.
+    /// Start of the timeout: creation of this object, or a StillWorking that renews the timeout.
     Clock::time_point heard = Clock::now();
-    Clock::time_point sent = Clock::now();  ///< time of the last sending; initially the start
-    std::uint64_t sent_over = 0;            ///< connection that sent the request; 0: none yet
+    Clock::time_point sent = Clock::now();  ///< time of the last sending or StillWorking
+    std::uint64_t sent_over = 0;            ///< connection that sent the request; 0 if unsent
     Clock::time_point word = {};            ///< time of the last StillWorking message
-    std::optional<bool> runs = {};  ///< field `runs` of that message: the query runs or waits
+    std::optional<bool> runs = {};  ///< `runs` of the last StillWorking: false if the query waits
   };
 
   protocol::ClientReply call(protocol::ClientRequest request, const Tell& tell = {});
@@ -160,7 +160,7 @@ class Connection : public Source {
   zmq::socket_t socket_;
   protocol::SocketMonitor monitor_;
   unsigned attempt_ = 0;          ///< attempts to connect; they alternate between address families
-  unsigned failed_attempts_ = 0;  ///< attempts since the last successful one
+  unsigned failed_attempts_ = 0;  ///< failed attempts since the last successful one
   Clock::time_point connecting_since_ = Clock::now();
   std::uint64_t connections_before_ = 0;  ///< number of connections before the present attempt
   std::uint64_t last_request_id_ = 0;
@@ -170,9 +170,9 @@ class Connection : public Source {
 
 /// Values of --db, --server, --keys and --timeout.
 struct SourceFlags {
-  std::string database;             ///< empty if not given
-  std::string server;               ///< empty if not given
-  std::optional<double> timeout_s;  ///< nothing: the default of the source
+  std::string database;             ///< database file; empty if not given
+  std::string server;               ///< address of the server; empty if not given
+  std::optional<double> timeout_s;  ///< time limit of an answer; empty if not given
   std::string keys = {};            ///< key file; empty if not given
   bool may_be_file = false;         ///< whether the command has --db
 };
@@ -191,8 +191,8 @@ void add_database_argument(CLI::App& command, std::filesystem::path& file);
 /// and for an unusable key file.
 ConnectionSettings connection_settings(Console& console, const SourceFlags& flags);
 
-/// Returns the database that --db names or, if no server is named either, oblique.db in the current
-/// folder. An empty path means that the command uses a server.
+/// Returns the database file that --db names, or else, if no server is named, oblique.db in the
+/// current folder if it exists. An empty path means that the command uses a server.
 std::string database_meant(const SourceFlags& flags);
 
 /// Opens the database of `database_meant`, or else the server of `connection_settings`.

@@ -187,7 +187,7 @@ std::string EphemeralKeys::file_of(protocol::Role role) const {
 }
 
 EmbeddedService::EmbeddedService(const ServiceSettings& settings, protocol::StopSignals& stop) {
-  static_cast<void>(sibling_program("oblique-worker"));  // fails here before the server starts
+  static_cast<void>(sibling_program("oblique-worker"));  // throws early if the program is missing
   start_server(settings, stop);
   for (int i = 0; i < settings.workers; ++i) {
     start_worker(settings);

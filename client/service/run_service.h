@@ -28,7 +28,7 @@ struct ServiceSettings {
   int workers = 1;                      ///< number of worker processes, which share the cores
   bool allow_network_disk = false;      ///< permits a database on a network file system
   std::string http = "off";             ///< address of the web page: ADDRESS:PORT
-  std::uint64_t fall_memory_bytes = 0;  ///< of all workers; 0: an eighth of the free memory
+  std::uint64_t fall_memory_bytes = 0;  ///< memory for all workers' falls; 0: 1/8 of free memory
   std::string only_study{};             ///< solves only this study; empty: all studies
   bool verbose = false;                 ///< server and workers write to our standard error
 };

@@ -22,10 +22,10 @@ struct DatabaseSettings {
 struct ResultQuery {
   std::string study = {};
   std::string where = {};  ///< empty: all points
-  /// Columns. Empty: the axes that vary and the main outputs; with `group`, columns per group.
+  /// Columns; default: the axes that vary and the main outputs; for groups, `group` and count(*).
   std::string select = {};
   std::string group = {};                  ///< columns to group by; empty: no groups
-  std::string order = {};                  ///< empty: by point; with `group`, by its columns
+  std::string order = {};                  ///< default: by point number, or by `group`
   std::optional<std::int64_t> limit = {};  ///< nothing: all rows
 };
 

@@ -21,7 +21,7 @@ class WaitMessages {
  public:
   using Seconds = std::chrono::duration<double>;
 
-  /// Shorter waits are not reported, because workers come and go.
+  /// Shortest wait of a study that is reported. Shorter waits are normal: workers come and go.
   static constexpr Seconds kShortestWait{2};
 
   /// Returns the message that is due at `elapsed`, which must not decrease, or an empty text.
@@ -56,7 +56,7 @@ class FollowedStudy {
  private:
   Source& source_;
   std::string name_;
-  std::uint64_t study_id_ = 0;  ///< 0: not known yet
+  std::uint64_t study_id_ = 0;  ///< 0 before the first status
 };
 
 /// Prints to standard error the reasons of failures, or that the study was cancelled. Returns the

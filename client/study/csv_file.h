@@ -58,7 +58,7 @@ class CsvFiles {
  public:
   /// Relative paths start at `folder`.
   explicit CsvFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
-  /// Throws InputError as CsvFile does, and for all but regular files of at most 64 MiB.
+  /// Throws InputError as CsvFile does, and if `path` is not a regular file of at most 64 MiB.
   const CsvFile& at(const std::string& path);
 
  private:

@@ -53,7 +53,7 @@ std::optional<std::int64_t> whole_number(std::string_view part) {
                                                                   : std::nullopt;
 }
 
-/// Parses from:to:count, from:to:count:log, from:to:step=STEP, or in a sample from:to.
+/// Parses from:to:count, from:to:count:log or from:to:step=STEP; in a sample also from:to.
 protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, BlockKind kind) {
   constexpr std::string_view kStep = "step=";
   const auto parts = protocol::split(text, ':');
@@ -127,8 +127,8 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   return written;
 }
 
-/// Whether a text is NAME(...) with the name of a distribution. In a sample, any name counts except
-/// the name of a function.
+/// Whether a text has the form NAME(...), where NAME is a distribution. In a sample, NAME may be
+/// anything except the name of a function.
 bool is_distribution(std::string_view text, BlockKind kind) {
   const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
   const auto functions = expressions::function_names();

@@ -60,8 +60,8 @@ Places places_of(const PointFlags& flags);
 
 /// Defines a study by a file or by point flags.
 struct StudyFlags {
-  std::filesystem::path file;  ///< empty: the point flags define the study
-  std::string name;            ///< empty: the file's name, or one made from the recipe
+  std::filesystem::path file;  ///< if empty, the point flags define the study
+  std::string name;            ///< default: the file's name, or a name made from the recipe
   PointFlags points;
   bool errors = false;  ///< estimates errors even if the file does not request it
 };

@@ -61,7 +61,7 @@ void ReachChecker::operator()(const protocol::PointTable& study) {
 /// Returns the drop [m] that the tip reaches, at most H. After kMaxFalls solved falls, assumes that
 /// the tip reaches H.
 double ReachChecker::reached_m(const solver::ModelParameters& model, double H_m) {
-  constexpr int kCoarse = 2;      // elements per link: cheap, and nearly the same fall
+  constexpr int kCoarse = 2;      // elements per link; quick to solve, and the fall differs little
   constexpr double kRoom = 0.98;  // safety margin for the drop on the coarse mesh
   const double length_m = std::accumulate(model.lengths_m.begin(), model.lengths_m.end(), 0.0);
   if (H_m <= protocol::kSurelyReached * length_m) {

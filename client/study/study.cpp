@@ -17,7 +17,7 @@
 namespace oblique::client {
 namespace {
 
-/// Returns the elements per link of the coarsest mesh, not counting expressions.
+/// Returns the smallest number of elements per link in any block. Ignores expressions.
 int coarsest_mesh(const protocol::Recipe& recipe) {
   constexpr int kUnknown = std::numeric_limits<int>::max();
   int coarsest = kUnknown;

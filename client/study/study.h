@@ -39,7 +39,7 @@ void check_points(const Study& study);
 void note_coarse_mesh(std::ostream& out, const protocol::Recipe& recipe);
 
 /// Writes a note for each key with an unusual value, which is likely to be in another unit. Also
-/// writes a note for each range in a sample that has a count and is therefore a list of values.
+/// writes a note for each range with a count in a sample, because it is a list of values.
 void note_unusual_values(std::ostream& out, const protocol::Recipe& recipe);
 
 }  // namespace oblique::client

@@ -254,7 +254,7 @@ std::string text_in(const StoredRow& row, const std::string& column) {
   return text == nullptr ? std::string() : *text;
 }
 
-/// Whether a stored value equals a computed one. Stored lists have only 8 digits of numbers.
+/// Whether a stored value equals a computed one. Numbers in stored lists have only 8 digits.
 bool is_kept_as(const json& stored, const solver::Cell& cell) {
   constexpr double kHalfOfTheLastDigit = 5.1e-8;
   if (const auto* text = std::get_if<std::string_view>(&cell)) {

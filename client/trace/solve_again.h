@@ -116,8 +116,8 @@ class TraceOutput {
   solver::TraceShape shape_;
   std::string text_;                 // CSV that is not yet written
   std::size_t rows_ = 0;             // of JSON
-  std::vector<double> numbers_;      // numbers of all rows, for JSON
-  std::vector<std::string> states_;  // likewise
+  std::vector<double> numbers_;      // numbers of all rows, one row after the other, for JSON
+  std::vector<std::string> states_;  // states of all rows, for JSON
 };
 
 }  // namespace oblique::client

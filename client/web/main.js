@@ -167,7 +167,7 @@ async function begin() {
     },
   });
   addEventListener("popstate", show);
-  // Updates the address before a click follows or copies a link.
+  // Writes the address before a click is handled, because the click may follow or copy a link.
   document.addEventListener("click", writeAddress, { capture: true });
   // A change of the colour scheme requires redrawing all canvases.
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {

@@ -16,7 +16,7 @@ forces = cube.fn_peak_N.to_dataframe().dropna().reset_index().sort_values(["H", 
 forces = forces.groupby(["H", "mu"], as_index=False).last()[["H", "mu", "fn_peak_N"]]
 print(forces.to_csv(index=False), end="")
 
-# Lists have their own views. This one has a row per interval in which the particle P does not move.
+# Lists have their own views: stick_intervals has a row per interval in which particle P sticks.
 spans = pandas.read_sql_query(
     "SELECT point, t0_s, t1_s FROM stick_intervals WHERE study_id = (SELECT min(study_id) FROM studies)",
     database,

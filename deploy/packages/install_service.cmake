@@ -1,6 +1,6 @@
-# Installs units, account and configuration of a service, `part` (server or worker). cmake --install
-# and cpack include it and set CMAKE_INSTALL_PREFIX and DESTDIR. The environment variable
-# OBLIQUE_PREFIX gives the final folder if it differs.
+# Installs units, account and configuration of a service; `part` is server or worker. cmake
+# --install and cpack include this file and set CMAKE_INSTALL_PREFIX and DESTDIR. The environment
+# variable OBLIQUE_PREFIX gives the final folder if it is not CMAKE_INSTALL_PREFIX.
 set(prefix "${CMAKE_INSTALL_PREFIX}")
 if(DEFINED ENV{OBLIQUE_PREFIX})
   set(prefix "$ENV{OBLIQUE_PREFIX}")
@@ -40,8 +40,8 @@ else()
                     oblique-server.conf)
 endif()
 
-# An existing configuration is not overwritten. It is not in the manifest, so removing the files of
-# the manifest keeps it, too.
+# An existing configuration is not overwritten. The manifest does not contain the configuration, so
+# removing the files of the manifest keeps it, too.
 if(NOT EXISTS "$ENV{DESTDIR}${configuration}/${part}.toml")
   fill_in("${systemd}/${part}.toml" "${configuration}" ${part}.toml)
 endif()

@@ -1,6 +1,6 @@
-# Installs the solver for use by other programs, in two parts like Debian's packages: `library` to
-# run programs, `development` to build them. find_package(oblique) provides oblique::solver in any
-# prefix. This part is optional, so that installing works when only the programs were built.
+# Installs the solver for use by other programs. Like Debian's packages, it has two parts: `library`
+# to run programs, `development` to build them. find_package(oblique) provides oblique::solver in
+# any prefix. `library` is optional, so that installing works when only the programs were built.
 install(TARGETS oblique_shared EXPORT oblique-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library OPTIONAL NAMELINK_COMPONENT development)
 set(solver_folder ${PROJECT_SOURCE_DIR}/worker/solver/library)

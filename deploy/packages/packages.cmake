@@ -51,7 +51,7 @@ set(CPACK_OBLIQUE_LIBDIR ${CMAKE_INSTALL_LIBDIR})
 set(CPACK_OBLIQUE_MULTIARCH ${CMAKE_LIBRARY_ARCHITECTURE})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME ${package_of_library})
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION "libs\nMulti-Arch: same")
-# packing/debian_library.cmake sets the dependencies instead.
+# packing/debian_library.cmake sets the dependencies, which cpack would otherwise determine.
 set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS OFF)
 # A program built with the library runs with the same and any later release of the same SONAME.
 file(CONFIGURE OUTPUT debian/library/shlibs CONTENT "liboblique ${abi} ${package_of_library} (>= ${PROJECT_VERSION})\n")

@@ -378,7 +378,7 @@ AuthorizedKeys read_authorized_keys(const std::string& path) {
 
 void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change) {
-  // Replaces the target of a symbolic link, because other links may point to the target.
+  // If `path` is a symbolic link, replaces its target, to which other links may point.
   const std::string target = std::filesystem::weakly_canonical(path);
   const Descriptor folder = opened_folder_of(target);
   if (::flock(folder.number(), LOCK_EX) != 0) {

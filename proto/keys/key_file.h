@@ -56,7 +56,7 @@ CurveKey public_key_of(const SecretKey& secret_key);
 
 /// Formats a key as 40 printable characters without quotes, backslashes or spaces.
 std::string z85(const CurveKey& key);
-/// Returns nothing for a text that is not a key.
+/// Returns the key that `text` encodes (see z85), or nothing if `text` is not a key.
 std::optional<CurveKey> parse_z85(std::string_view text);
 
 /// The content of a program's key file.
@@ -118,14 +118,14 @@ void change_authorized_keys(const std::string& path,
 std::string key_file_in(const std::string& folder, const std::string& name);
 std::string authorized_keys_in(const std::string& folder);
 
-/// Returns `named`. If it is empty, returns the current folder, or its subfolder `keys` if only
-/// that has a server key. Throws solver::InputError if the folder has no server key.
+/// Returns `named`. If it is empty, returns the current folder, or its subfolder `keys` if only the
+/// subfolder has a server key. Throws solver::InputError if the folder has no server key.
 std::string find_key_folder(const std::string& named);
 
 /// Creates server.key, client.key, worker.key, reader.key, and the list with the last three keys.
 /// Creates a missing folder with mode 0700. Returns the server's public key. Throws
-/// std::runtime_error if a file cannot be created. If one of the files exists, throws it before
-/// creating any.
+/// std::runtime_error if a file cannot be created, and, before it creates any, if one of them
+/// exists.
 CurveKey make_key_folder(const std::string& folder);
 
 /// Adds `public_key` to the list. Without `public_key`, creates a key pair, writes it to NAME.key

@@ -9,8 +9,8 @@ import { scale, ticks, tickText } from "./scale.js";
  * isLog, ends}; y {label, unit, isLog, ends}; series [{label, values, look, isThick}]; isBars;
  * spans [{from, to, ink, isBand}] behind the lines (a band is a strip at the bottom). Callbacks:
  * zoom(part) and select(part), where part is {x: [from, to], y: [from, to] or null}, or null to
- * show everything or select nothing; moved(i) when the cursor moves to value i. With dragSelects,
- * dragging selects and Shift with dragging zooms; without it, the reverse.
+ * show everything or select nothing; moved(i) when the cursor moves to value i. Dragging zooms, and
+ * Shift with dragging selects; dragSelects exchanges the two.
  */
 
 // uPlot comes from a classic script, which runs before modules (index.html).

@@ -79,8 +79,8 @@ export function categoryPixel(look, x, y) {
 export const categoryColour = (look) => cssColour(looks[look].plain);
 
 /**
- * Returns the pixel at position x, y in a cell without a value. Kinds: missing, failed, left_out,
- * none (no such value), filtered.
+ * Returns the pixel at position x, y in a cell without a value. Kinds of cells: missing, failed,
+ * left_out, none (the result has no such value), filtered.
  */
 export function emptyPixel(why, x, y, isDark) {
   const [ground, line, error] = isDark

@@ -75,7 +75,7 @@ export function copyButton(label, text, settings = {}) {
   return button(label, copy, settings);
 }
 
-/** A command line with a button that copies it; `name` describes what the command gives. */
+/** Creates a command line with a copy button, whose label contains `name` ("the row"). */
 export const command = (name, text) =>
   h(
     "div.copied",
@@ -85,7 +85,7 @@ export const command = (name, text) =>
 
 const focusable = "a[href], button, input, select, [tabindex]";
 const containers = ["THEAD", "TBODY", "TR"];
-// The values of these elements are not attributes, so equal elements may show different values.
+// Equal elements of these kinds may have different contents, because these are not attributes.
 const withState = "input, select, canvas";
 
 /**

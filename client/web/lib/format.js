@@ -60,7 +60,7 @@ export function timeLeft(seconds) {
 export const quoted = (text) =>
   /^[A-Za-z0-9_.,:=/@%+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 
-/** Returns the flag of a database file, or "" for commands that use the server. */
+/** Returns " --db FILE" for commands that read `file`, or "" for commands that use a server. */
 export const dbFlag = (file) => (file ? ` --db ${quoted(file)}` : "");
 
 const csvField = (value) =>

@@ -4,7 +4,7 @@ import { ink } from "./colours.js";
 const margin = 12; // CSS pixels
 const lineHeight = 20;
 
-/** Returns the entries of a legend: an optional sign and a text each. */
+/** Returns the entries of a legend. Each has a text and may have a sign (a canvas). */
 function entriesOf(legend) {
   const found = [...(legend?.querySelectorAll("p, .bar canvas, li") ?? [])];
   return found.map((one) => ({

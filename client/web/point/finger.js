@@ -169,7 +169,7 @@ function tipAtGround(trace) {
     drawGround(context, width, level);
     const past = Array.from({ length: row + 1 }, (_, i) => [px(x[i]), py(y[i])]);
     drawPath(context, past, "weak", 1);
-    // The last element is drawn with its true direction only; its length is not to scale.
+    // The last element is drawn in its true direction, but its length is not to scale.
     const [nx, ny] = trace.nodes(row).slice(-4);
     const [dx, dy] = [nx - x[row], ny - y[row]];
     const far = width / (Math.hypot(dx, dy) || 1);

@@ -245,7 +245,7 @@ export async function pointView(root, place, id, point) {
         if (update.row) show();
         done = completedNow;
       } catch {
-        // the next overview starts another attempt
+        // the point is read again with the next overview
       }
       isAsking = false;
     },

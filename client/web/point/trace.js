@@ -22,8 +22,8 @@ export async function loadTrace(study, point, signal, say) {
 }
 
 /**
- * Splits a trace into columns in SI units; nodes (alternating x and y, from the pin) and state of
- * each row; and time spans of phases and stick [s].
+ * Splits a trace into columns in SI units. Also returns the nodes (alternating x and y, from the
+ * pin) and the state of each row, and the time spans [s] of phases and stick.
  */
 function parse({ head, bytes, begin }) {
   const { rows, row_numbers: width } = head;

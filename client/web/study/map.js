@@ -358,7 +358,7 @@ export class MapCanvas {
 
   #press(event) {
     const at = this.#at(event);
-    // A touch scrolls the page, except when dragging selects.
+    // A touch scrolls the page unless dragging selects.
     const mayDrag = event.pointerType === "mouse" || this.dragSelects;
     if (event.button !== 0 || !mayDrag || !this.#cellAt(at)) return;
     this.#drag = [...at, ...at];

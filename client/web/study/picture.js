@@ -5,12 +5,12 @@ import { joined, within } from "./conditions.js";
 import { ownAxes } from "./fields.js";
 
 /**
- * The form of a picture. It has sides x and y. A side has name, unit (SI), values, isWhole (the
- * values between the ends are complete), and either the edges of bins or the indices of the values
- * on their axis. The picture also has z {name, unit, isCategory}; `least` and `most`, the range of
- * z; values by rows (for categories indices into the dictionary [{text, cells}]); the head of the
- * server's answer; point(column, row); whyEmpty(cell), which returns "" or one of emptyKinds; and
- * dots {points, x, y, z} for single points, or labels for lines.
+ * The form of a picture. It has sides x and y. A side has name, unit (SI), values, isWhole
+ * (`values` omits no value between its ends), and either edges (of bins) or numbers (indices of the
+ * values on their axis). The picture also has z {name, unit, isCategory}; `least` and `most`, the
+ * range of z; values, row by row (for categories, indices into the dictionary [{text, cells}]); the
+ * head of the server's answer; point(column, row); whyEmpty(cell), which returns "" or one of
+ * emptyKinds; and dots {points, x, y, z} for single points, or labels for lines.
  */
 
 /** Kinds of cells without a value, in the order of their bits in the server's answer. */
@@ -27,7 +27,7 @@ const mostForMedians = 100_000;
 const ask = (study, kind, query, signal) =>
   numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
-/** Returns the indices of the `shown` values of an axis that the server sends. */
+/** Returns the axis indices of the values in an answer: `shown`, evenly from `first` to `last`. */
 function numbersOf({ first, last }, shown) {
   const steps = Math.max(shown - 1, 1);
   const number = (i) => first + Math.floor((2 * i * (last - first) + steps) / (2 * steps));

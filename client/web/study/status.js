@@ -7,7 +7,7 @@ import { axisValue, columnOfAxis } from "./fields.js";
 
 /**
  * Minimum number of elements per link for accurate results. With fewer, forces are off by more than
- * 0.2 %, and a tenth of the modes differ.
+ * 0.2 %, and a tenth of the points get another mode (sequence of states).
  */
 const enoughElements = 8;
 

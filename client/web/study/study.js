@@ -218,7 +218,7 @@ export class StudyView {
     this.place.keep(this.fields, isStep);
   }
 
-  /** The block of the grid in the picture; undefined if the picture is not of a grid. */
+  /** The block that a picture of a grid shows; undefined if the picture is not of a grid. */
   get block() {
     const isOfGrid = ["map", "lines"].includes(this.field("pic")) && this.field("block") !== "";
     return isOfGrid ? this.study.blocks[Number(this.field("block"))] : undefined;
@@ -232,7 +232,7 @@ export class StudyView {
       (end) => this.field(end) !== "" && Number.isFinite(Number(this.field(end))),
     );
   }
-  /** Returns the selected value of each fixed axis, as index by key. */
+  /** Returns a Map from the key of each fixed axis to the index of its selected value. */
   places() {
     const held = this.field("at")
       .split(",")
@@ -356,7 +356,7 @@ export class StudyView {
     this.draw();
     this.#showChoice();
     this.refine.offer();
-    this.table.load(); // loads only if another part is shown
+    this.table.load(); // the table loads only if its query has changed
   }
 
   draw() {

@@ -1,4 +1,4 @@
-// The table of the shown points, in pages: those in the shown part that meet filter and selection.
+// The table of the points that the picture shows and that meet filter and selection, in pages.
 import { rows, rowsPath } from "../api.js";
 import { button, h, setChildren } from "../lib/dom.js";
 import { count, heading, shown, shownUnit } from "../lib/format.js";
@@ -142,7 +142,7 @@ export class PointTable {
     this.view.set({ page: page > 1 ? String(page) : "" });
     this.load();
   }
-  /** Sorts by a column: ascending, at the next call descending, then by point again. */
+  /** Sorts by a column: ascending at the first call, then descending, then again by point. */
   #sort(name) {
     const next = { [name]: `${name} DESC`, [`${name} DESC`]: "" }[this.view.field("order")] ?? name;
     this.view.set({ order: next, page: "" });

@@ -26,7 +26,7 @@ if(NOT lib STREQUAL multiarch)
   endforeach()
   file(GLOB targets "${development}/${multiarch}/cmake/oblique/oblique-targets-*.cmake")
   change("${targets}" "\${_IMPORT_PREFIX}/${CPACK_OBLIQUE_LIBDIR}/" "\${_IMPORT_PREFIX}/lib/${CPACK_OBLIQUE_MULTIARCH}/")
-  # The CMake files are now one folder deeper, so the prefix is one folder further up.
+  # The CMake files are now one folder deeper, so the prefix is one more folder above them.
   set(up "get_filename_component(_IMPORT_PREFIX \"\${_IMPORT_PREFIX}\" PATH)\nif(")
   change("${development}/${multiarch}/cmake/oblique/oblique-targets.cmake" "${up}"
          "get_filename_component(_IMPORT_PREFIX \"\${_IMPORT_PREFIX}\" PATH)\n${up}")
