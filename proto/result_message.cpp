@@ -88,7 +88,7 @@ void read_phase(CaseResult& result, const double* end_s) {
   phases.push_back({kind, phases.empty() ? 0.0 : phases.back().t1_s, *end_s});
 }
 
-/// The order is that of solver::result_lists().
+/// The lists have the same order as in solver::result_lists().
 constexpr std::array<SentList, 5> kLists{{
     {&PointResult::peaks, &PointResult::mutable_peaks, 0, 3, read_peak},
     {&PointResult::ft_peaks, &PointResult::mutable_ft_peaks, 0, 2,

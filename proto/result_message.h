@@ -38,7 +38,7 @@ PointResult failed_point(std::uint64_t point, const std::string& reason);
 /// kLargestOutput, has lists of impossible length, or is too large.
 std::string fault_of(const PointResult& message);
 
-/// Maximum size of the rows of a trace [bytes]. With its result and model it fits into one frame.
+/// Maximum size of the rows of a trace [bytes]. A frame contains them with a result and a model.
 inline constexpr std::size_t kMaxTraceBytes =
     kMaxFrameBytes - kMaxResultBytes - (std::size_t{64} << 10U);
 

@@ -69,7 +69,7 @@ toml::table TomlReader::parse(std::string_view text) const {
   constexpr std::size_t kLongestError = 150;  // messages of toml++ may contain long keys
   constexpr std::size_t kMaxKeyParts = 100;
   // A key with many parts makes deeply nested tables, whose destructors recurse. This check runs
-  // before parsing. So it also counts dots in other text that has no comma or equals sign.
+  // before parsing, so it counts dots in other text too, up to a comma, '=', bracket or line end.
   std::size_t parts = 1;
   std::size_t line = 1;
   for (const char c : text) {

@@ -124,7 +124,7 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
   for (CLI::Option* option : app_.get_options()) {
     if (option->get_configurable()) {
       settings_.push_back({option, key_of(*option), option->get_envname()});
-      option->envname("");  // CLI11 would prefer this variable to the program's own variable
+      option->envname("");  // else CLI11 would prefer the shared variable to the program's own
     }
   }
   app_.footer(fmt::format(

@@ -54,9 +54,9 @@ class Message : public spdlog::custom_flag_formatter {
   Form form_;
 };
 
-/// Returns whether systemd's journal reads standard error. JOURNAL_STREAM names the file that
-/// systemd opened for that. Programs inherit the variable even if their standard error was
-/// redirected, so the file is compared.
+/// Returns whether standard error goes to systemd's journal. JOURNAL_STREAM contains device and
+/// inode of the file that systemd opened for this. A program inherits the variable even if its
+/// standard error is redirected, so device and inode of standard error are compared.
 bool journal_reads_standard_error() {
   const char* const stream = std::getenv("JOURNAL_STREAM");
   struct stat file {};

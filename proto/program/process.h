@@ -40,7 +40,7 @@ class StopSignals {
  private:
   sigset_t before_{};
   Descriptor descriptor_;
-  int signal_ = 0;  ///< number of the first signal; 0: none
+  int signal_ = 0;  ///< number of the first signal; 0 if none has arrived
 };
 
 /// Makes a write to a pipe without a reader, or beyond the file size limit, return an error instead

@@ -35,7 +35,7 @@ std::vector<std::string> known_words(const CLI::App& command) {
 
 void refuse_empty_values(CLI::App& app) {
   for (auto* option : app.get_options()) {
-    // Options that need no value are excluded.
+    // Options that need no value are not checked.
     if (option->get_items_expected_min() > 0) {
       option->check(empty_value_error);
     }
@@ -78,7 +78,7 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
   std::vector<std::string_view> commands;
   std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(commands),
                [](std::string_view word) { return !word.starts_with("-"); });
-  // Reports an unknown word first, because it may be a misspelling of a missing command or flag.
+  // Reports an unknown word before a missing command or flag, which the word may misspell.
   if (const auto unexpected = app.remaining(true); !unexpected.empty()) {
     const std::string& first = unexpected.front();
     const bool is_command = !commands.empty() && !first.starts_with("-");

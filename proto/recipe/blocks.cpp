@@ -129,8 +129,8 @@ RangeValues::RangeValues(const Axis& axis)
     if (!(std::abs(first) < kExactBelow && std::abs(end) < kExactBelow && last < kExactBelow)) {
       break;
     }
-    // If both ends are decimals with the same factor `per_unit`, each value is the double nearest
-    // to its decimal: 0.1:1:10 contains 0.3.
+    // If `per_unit` times the ends and the step are whole numbers, each value is a quotient of
+    // whole numbers: the double nearest to its decimal. For example, 0.1:1:10 contains 0.3.
     if (first / per_unit == from_ && end / per_unit == to_ && std::fmod(end - first, last) == 0.0) {
       decimals_ = {first, (end - first) / last, per_unit};
       break;
@@ -293,8 +293,7 @@ void check_list(const ParameterKey& key, const Axis& axis, BlockKind kind) {
           twice == values.end() ? 0.0 : *twice);
 }
 
-/// Returns whether the key takes only whole numbers. The key must allow `from` and values up to
-/// `to`.
+/// Returns whether the key takes only whole numbers. Its domain must include [from, to].
 bool takes_whole_numbers(const ParameterKey& key, double from, double to) {
   return !key.is_allowed(from + std::min(0.25, 0.5 * (to - from)));
 }
@@ -479,7 +478,7 @@ bool needs_point_validation(const solver::ModelParameters& model, const Block& b
     check_reach(model, block);
     return false;
   } catch (const InputError&) {
-    return true;  // the finger may be longer at the points with the largest H
+    return true;  // points with the largest H may have longer fingers than the shortest
   }
 }
 

@@ -110,7 +110,7 @@ struct AxisLayout {
 /// Returns the axes of a checked block, in order.
 std::vector<AxisLayout> layout_of(const Block& block);
 
-/// Returns the model of the shortest finger in the block. Leaves out axes that are expressions.
+/// Returns the model of the shortest finger in the block. Ignores axes that are expressions.
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
 
 /// The tip of any finger can drop by this fraction of the finger's length. H must not exceed the
@@ -130,11 +130,10 @@ void check_ends(const solver::ParameterKey& key, double from, double to);
 /// on the point it is not checked (`needs_point_validation`).
 void check_block(const solver::ModelParameters& model, const Block& block);
 
-/// Returns whether values, or H against the finger's length, can only be checked point by point.
+/// Returns whether a block has an expression, a filter, or an H above the length of a finger.
 bool needs_point_validation(const solver::ModelParameters& model, const Block& block);
 
-/// Makes a block from axes with known keys, and sorts them: model keys as in listings, H, mu and e.
-/// Does not check them.
+/// Makes a block from axes with known keys. Sorts the axes by `key_number`; does not check them.
 Block block_of(std::vector<Axis> axes);
 
 }  // namespace oblique::protocol

@@ -20,7 +20,7 @@ using solver::InputError;
 constexpr std::size_t kLongestQuoted = 40;
 constexpr const char* kComma = "`,` is allowed only between the arguments of a function";
 
-/// Returns NaN if `x` contains NaN, because an undefined condition must not count as false.
+/// Returns NaN if x[0] or x[1] is NaN, because an undefined condition must not count as false.
 double truth(const double* x, bool value) {
   return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
                                               : static_cast<double>(value);

@@ -44,7 +44,7 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-/// Maximum size of a recipe [bytes]. It must fit into a frame for a worker, with other fields.
+/// Maximum size of a recipe [bytes]. A frame for a worker contains the recipe and other fields.
 constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
 
 std::string comparable_bytes(Block block) {
@@ -85,8 +85,8 @@ ModelParameters to_message(const solver::ModelParameters& model) {
 }
 
 solver::ModelParameters from_message_unchecked(const ModelParameters& message) {
-  // Checks these two fields before the conversion, because their values may not fit into the
-  // struct's members (`int` and an enumeration).
+  // elements_per_link and integrator are checked before the conversion, because their values may
+  // not fit into the struct's members (`int` and an enumeration).
   solver::check_value(model_key("elements_per_link"), message.elements_per_link());
   solver::check_value(model_key("integrator"), message.integrator());
   solver::ModelParameters model;
@@ -106,7 +106,7 @@ solver::ModelParameters from_message(const ModelParameters& message) {
 }
 
 std::string canonical_model(const solver::ModelParameters& model) {
-  std::vector<std::string> lengths;  // adding 0.0 gives both zeros the same text
+  std::vector<std::string> lengths;  // -0.0 + 0.0 is 0.0, so both zeros have the same text
   for (const double length_m : model.lengths_m) {
     lengths.push_back(exact_number(length_m + 0.0));
   }
@@ -292,7 +292,7 @@ solver::ModelParameters ModelInput::model() const {
   for (const auto& [name, value] : values) {
     solver::check_value(model_key(name), value);
   }
-  // `links` must be applied before `length`, which is also the order of the listing.
+  // `links` must be applied before `length`; model_keys() has them in this order.
   for (const auto& key : solver::model_keys()) {
     if (const auto value = values.find(key.name); value != values.end()) {
       key.set(model, value->second);

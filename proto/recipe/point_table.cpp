@@ -149,7 +149,7 @@ class PointTable::BlockPoints : public BlockPlace {
     return base;
   }
 
-  /// Returns why the point cannot be solved, with its values; nothing if it can be solved.
+  /// Returns why the point cannot be solved, and names its values; nothing if it can be solved.
   std::optional<InputError> fault(const solver::ModelParameters& base,
                                   std::span<const double> values) const {
     if (filter_ && std::isnan(filter_->expression.value_at(values))) {
@@ -227,12 +227,12 @@ class PointTable::BlockPoints : public BlockPlace {
     return key_numbered(key).get(base);
   }
 
-  /// Returns the number of consecutive points with the same model: all if no model key varies; 1 if
-  /// a model key depends on a value that varies from point to point; in a product the number of
-  /// combinations of H, mu and e.
+  /// Returns the number of consecutive points with the same model. It is 1 if a model key may
+  /// change from point to point. Otherwise, in a product with model axes, it is the number of
+  /// combinations of H, mu and e. In other blocks it is the number of all points.
   std::uint64_t counted_points_per_model() const {
     const bool is_product = block_kind(*block_) == BlockKind::kProduct;
-    std::vector<bool> varies;  // whether each axis varies while the model axes stay fixed
+    std::vector<bool> varies;  // by axis: whether it varies (in a product: at fixed model axes)
     for (const Source& source : sources_) {
       varies.push_back(is_drawn(*source.layout.axis) &&
                        (!is_product || is_point_key(source.layout.key)));
@@ -302,7 +302,7 @@ class PointTable::BlockPoints : public BlockPlace {
 
   const Block* block_;
   std::vector<Source> sources_;    ///< one per axis
-  std::vector<Formula> formulas_;  ///< each comes after the formulas that compute its inputs
+  std::vector<Formula> formulas_;  ///< each formula follows the formulas of its inputs
   std::optional<Formula> filter_;
 };
 
@@ -522,7 +522,7 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table) 
   try {
     has_model = has_model || (result.has_model() && is_close(from_message_unchecked(result.model()),
                                                              table.model(own.model)));
-  } catch (const InputError&) {  // a whole number of the model is outside its domain
+  } catch (const InputError&) {  // elements_per_link or integrator is outside its domain
   }
   return has_model ? "" : "the worker solved it with another model than that of the study";
 }
@@ -571,17 +571,17 @@ std::vector<std::uint64_t> some_points(const PointTable& table) {
     }
   });
   if (points.empty()) {
-    points.push_back(0);  // the filter includes no point, or too few to find one
+    points.push_back(0);  // no point passes the filters, or none of the random points does
   }
   return points;
 }
 
-/// Counts the different falls of the study. `some` contains all points or random ones. For random
-/// points the number is estimated (Good 1953): a point of the study has a fall of `some` about as
-/// probably as a point of `some` shares its fall with another point of `some`.
+/// Counts the different falls of the study. `some` contains all of its points, or random points.
+/// From random points the number is estimated (Good 1953): the number of different falls in `some`,
+/// divided by the fraction of points in `some` that share their fall with another one.
 void count_falls(const PointTable& table, const std::vector<std::uint64_t>& some, StudySize& size) {
   std::unordered_map<std::uint64_t, std::uint64_t> met;  // number of points by hash of their fall
-  std::optional<std::uint64_t> model;  // model of the last point; `fall` is the hash of its fall
+  std::optional<std::uint64_t> model;  // model of the previous point; its fall has the hash `fall`
   std::uint64_t fall = 0;
   for (const std::uint64_t point : some) {
     if (const auto next = table.point(point).model; next != model) {

@@ -87,8 +87,8 @@ class PointTable {
   /// domain by the value of the base model.
   Point point(std::uint64_t index) const;
   solver::ModelParameters model(std::uint64_t index) const;
-  /// Returns a point's values in the order of its block's axes. Expressions may be outside the
-  /// domain.
+  /// Returns a point's values in the order of its block's axes. Values of expressions may be
+  /// outside the domain.
   std::vector<double> values(std::uint64_t index) const;
   /// Returns the longest run of consecutive points around `index` that have the same model.
   /// Adjacent blocks without model axes are one run.
@@ -120,8 +120,8 @@ class PointTable {
   bool has_filter_ = false;
 };
 
-// These functions handle the inputs of a point (H, mu, e and the model), which a worker sends with
-// a result. On two machines their last bits may differ.
+// These functions handle the inputs of a point (H, mu, e and the model). A worker sends its inputs
+// with a result. They may differ in the last bits from the inputs that the server computes.
 
 /// Returns whether `value` equals the finite number `own` within a relative difference of 1e-12.
 /// Only zero is close to zero.
@@ -154,7 +154,7 @@ struct StudySize {
   bool points_estimated;  ///< true if `points` is estimated from random points
   std::uint64_t models;
   std::uint64_t falls;   ///< number of different falls
-  bool falls_estimated;  ///< true if `falls` is estimated from 10^4 random points of more than 10^5
+  bool falls_estimated;  ///< true if `falls` is estimated from random points of a large study
   std::uint64_t bytes;   ///< size of the results in a database [bytes]
   std::vector<std::uint64_t> examples;     ///< up to 64 random points that pass the filters
   std::vector<PassingPoints> blocks = {};  ///< one element per block

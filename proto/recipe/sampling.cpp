@@ -22,8 +22,8 @@ std::uint64_t mixed(std::uint64_t z) {
   return z ^ (z >> 31);
 }
 
-/// Permutes the numbers of `bits` bits by a Feistel network. Its two halves may differ in length.
-/// Each round changes one half by a hash of the other, so it is invertible.
+/// Permutes the numbers of `bits` bits by a Feistel network. The halves of a number may differ in
+/// length. Each round changes one half by a hash of the other, so the round is invertible.
 std::uint64_t shuffled_bits(std::uint64_t value, int bits, std::uint64_t key) {
   constexpr std::uint64_t kRounds = 8;
   const int low_bits = (bits + 1) / 2;

@@ -49,14 +49,14 @@ class Quantiles {
   double sd_;
   double from_;
   double to_;
-  /// Probability of the normal distribution below each end. If more of the interval lies above the
-  /// mean, the interval is mirrored about the mean, because small probabilities have more digits.
+  /// Probability of the normal distribution below each end. An interval whose middle lies
+  /// above the mean is mirrored about the mean, because probabilities near 1 are less precise.
   double below_from_ = 0.0;
   double below_to_ = 1.0;
   bool is_mirrored_ = false;
 };
 
-/// Returns the quantile z of 0 < p < 1 in the standard normal distribution, to about 1e-15.
+/// Returns the quantile of the standard normal distribution for 0 < p < 1, to about 1e-15.
 double normal_quantile(double p);
 
 /// Returns the probability of the standard normal distribution below z. The relative error is about

@@ -59,8 +59,8 @@ zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& setting
   }
   constexpr KeepAlive kKeepAlive;
   constexpr int kQueuedMessages = 1000;
-  // Maximum time of one attempt to connect. Without it the system would double its own pauses, and
-  // reconnecting could take a minute after the network is back.
+  // Maximum time of one attempt to connect. Without this limit the kernel would double the pauses
+  // between its own tries, and reconnecting could take a minute after the network is back.
   constexpr int kConnectTimeout_ms = 3000;
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   if (settings.key) {

@@ -30,8 +30,8 @@ struct DealerSettings {
 zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings);
 
 /// Starts to connect in the background, and again whenever a connection ends. A host name is
-/// resolved each time. A name may have IPv4 and IPv6 addresses while the server listens on one of
-/// them only. So each `attempt` uses the other version, IPv4 first. Throws the errors of
+/// resolved each time. A name may have addresses of both IP versions while the server listens on
+/// one version only. So an even `attempt` uses IPv4 and an odd one IPv6. Throws the errors of
 /// `make_dealer`.
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt = 0);
 
@@ -47,7 +47,7 @@ class SocketMonitor {
   SocketMonitor(const SocketMonitor&) = delete;
   SocketMonitor& operator=(const SocketMonitor&) = delete;
 
-  /// Returns a ZeroMQ socket that becomes readable when the state may have changed.
+  /// Returns a ZeroMQ socket that becomes readable when results of the functions below may change.
   void* handle() { return events_.handle(); }
 
   /// Returns the number of connections so far that have completed their handshake.

@@ -13,7 +13,7 @@ std::optional<std::uint64_t> memory_limit_bytes(const std::string& root, const s
     return limit;
   }
   std::string path = own.substr(at + 3, own.find('\n', at) - at - 3);
-  // In a container the path may be one of the host and not exist. The root exists.
+  // In a container the path may be valid only on the host. Missing files are skipped.
   for (bool is_top = false; !is_top; path.resize(is_top ? 0 : path.rfind('/'))) {
     is_top = path.size() <= 1;
     std::uint64_t bytes = 0;
@@ -26,7 +26,7 @@ std::optional<std::uint64_t> memory_limit_bytes(const std::string& root, const s
 
 std::uint64_t available_memory_bytes() {
   constexpr std::uint64_t kKibibyte = 1024;
-  std::uint64_t bytes = std::uint64_t{2} << 30U;  // used if the system does not report it
+  std::uint64_t bytes = std::uint64_t{2} << 30U;  // used if the free memory is unknown
   std::ifstream words("/proc/meminfo");
   for (std::string word; words >> word;) {
     if (std::uint64_t kibibytes = 0; word == "MemAvailable:" && words >> kibibytes) {

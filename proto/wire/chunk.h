@@ -16,7 +16,7 @@ namespace oblique::protocol {
 /// Codes of the kinds of cells in QueryReply.cells.
 enum class CellKind : char { kNull = 0, kInteger = 1, kReal = 2, kText = 3 };
 
-/// A value of a row. Only the member of its kind is valid.
+/// A value of a row. Besides `kind`, only the member for this kind is valid.
 struct Cell {
   CellKind kind = CellKind::kNull;
   std::int64_t integer = 0;

@@ -23,7 +23,7 @@ CodedInputStream stream_of(std::string_view bytes) {
 
 struct Found {
   std::size_t fields = 0;
-  std::size_t bytes = 0;  ///< size of texts, packed lists and messages
+  std::size_t bytes = 0;  ///< total size of the found texts, packed lists and messages
   bool is_whole = true;   ///< true if every message on the path is complete
 };
 

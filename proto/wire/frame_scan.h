@@ -9,8 +9,8 @@ namespace oblique::protocol {
 // Checks frames before they are parsed. A parsed message of two bytes may need hundreds of bytes,
 // so parsing a malicious frame could need a hundred times its size.
 
-/// Maximum size of a worker's frame [bytes], without a trace's rows. Workers split results at 1
-/// MiB.
+/// Maximum size of a worker's frame [bytes], without the rows of a trace. The results in a
+/// message have at most 1 MiB.
 inline constexpr std::size_t kMaxWorkerFrameBytes = std::size_t{4} * 1024 * 1024;
 /// Maximum number of results in one message. Workers send at most 1,000.
 inline constexpr std::size_t kMaxResultsAMessage = 10'000;

@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr mode_t kOwnerOnly = 0600;
 constexpr int kBusyTimeout_ms = 5000;
 
-/// Returns the lock that marks a database as used by a server. SQLite does not lock this byte.
+/// Returns a server's lock on a database. It covers one byte, which SQLite does not lock.
 struct flock servers_lock() {
   struct flock lock {};
   lock.l_type = F_WRLCK;

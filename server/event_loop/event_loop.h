@@ -110,12 +110,12 @@ struct LoopSettings {
   std::string client_port = "7600";
   QueryPoolSettings queries;
   NetworkLimits network;
-  std::optional<WebSettings> web;  ///< EventLoop sets the members `database` and `solver_version`
-  /// Time to wait for leased batches after a request to stop; 0: none.
+  std::optional<WebSettings> web;  ///< EventLoop sets `web->database` and `web->solver_version`
+  /// Time to wait for leased batches after a request to stop; 0 to stop without waiting.
   std::chrono::milliseconds drain{0};
   /// Called on the loop's thread several times a second, and once when the loop ends.
   std::function<void(const LoopState&)> on_turn = [](const LoopState&) {};
-  /// The caller must set `solver_version`. EventLoop sets the numbers that come from the database.
+  /// The caller must set `service.solver_version`. EventLoop sets the numbers from the database.
   ServiceSettings service;
 };
 
@@ -144,7 +144,7 @@ class EventLoop final : private Ports {
 
   /// Runs until `stop_fd` becomes readable or the database is lost. Then notifies workers, stores
   /// and acknowledges received results, and returns. With `drain` it first waits for leased
-  /// batches. `take_stop` must read `stop_fd`, so that a second signal ends this wait.
+  /// batches. `take_stop` must empty `stop_fd`, so that a second signal can end this wait.
   LoopEnd run(int stop_fd, const std::function<void()>& take_stop = {});
 
  private:
@@ -183,7 +183,7 @@ class EventLoop final : private Ports {
 
   const std::chrono::milliseconds drain_;
   const std::function<void(const LoopState&)> on_turn_;
-  std::optional<Clock::time_point> drain_until_;  ///< end of the wait for batches; empty: no wait
+  std::optional<Clock::time_point> drain_until_;  ///< end of the wait for batches, if any
   AccessControl access_;
   Store store_;
   CompletionQueue completions_;

@@ -146,8 +146,8 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   }
 }
 
-/// Removes or repairs references to lost rows, and counts completed points. Clears the checksum of
-/// studies and models with a damaged value; `check` compares their results with the recipes.
+/// Removes or repairs references to lost rows, and counts completed points. Clears wrong checksums
+/// of studies and models; `check` still compares results with recipes.
 void mend(sqlite3* database) {
   execute(database, fmt::format("UPDATE studies SET checksum = NULL WHERE checksum <> {};"
                                 "UPDATE models SET checksum = NULL WHERE checksum <> {};",

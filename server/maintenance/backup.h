@@ -24,9 +24,9 @@ struct Salvaged {
 };
 
 /// Makes a sound database `to` from the readable rows of `from`. A gap of n unreadable rows costs
-/// at most n readable rows. A server solves points without a row again. Does not change `from`. No
-/// server may use `from` meanwhile. Throws StorageError if `to` exists or `from` cannot be opened,
-/// and std::runtime_error if `to` cannot be written.
+/// at most n readable rows. A server that opens `to` solves the points of lost rows again. Does not
+/// change `from`. No server may use `from` meanwhile. Throws StorageError if `to` exists or `from`
+/// cannot be opened, and std::runtime_error if `to` cannot be written.
 Salvaged salvage(const std::string& from, const std::string& to);
 
 }  // namespace oblique::server

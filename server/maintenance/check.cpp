@@ -130,7 +130,7 @@ class StudyCheck {
   /// (proto/recipe/point_table.h), because another machine computed the values. Fast for rows in
   /// the order of their points.
   std::string recipe_fault(const protocol::PointTable& table) {
-    if (rows_.number(0) >= table.size()) {  // as unsigned, negative numbers are too large
+    if (rows_.number(0) >= table.size()) {  // negative numbers become large unsigned ones
       return "the study has no such point";
     }
     const protocol::Point point = table.point(rows_.number(0));
@@ -160,9 +160,9 @@ class StudyCheck {
            protocol::is_close(definition_.text(0), protocol::canonical_model(model));
   }
 
-  /// Compares `completed_ranges` and the state with the points that have a row. Only a filter can
-  /// complete a point without a row. If `counted` is 0, another program has deleted rows, so ranges
-  /// and state may be outdated.
+  /// Compares the ranges of completed points and the state of a study with its rows. Only a filter
+  /// can complete a point without a row. If the column `counted` is 0, another program has deleted
+  /// rows, and ranges and state may be outdated.
   void check_completed(const StudyTable& table, const IntervalSet& rows) {
     const bool is_counted = studies_.integer(9) != 0;
     const IntervalSet completed =
@@ -195,7 +195,7 @@ class StudyCheck {
   Statement studies_;
   Statement rows_;
   Statement definition_;
-  // numbers of the last two equal models: in the recipe, and in the table `models`
+  // the last two models found to be equal: number in the recipe, and in the table `models`
   std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};
   std::string name_;  // name of the current study
   std::vector<std::string> study_faults_;

@@ -49,7 +49,7 @@ StudyRow study_in(const Statement& row) {
 
 // In the statements below, ?1 is the study's number in the source and ?2 its number in the target.
 
-/// Selects points solved in both databases with different outputs, apart from the solver's time.
+/// Selects points that are solved in both databases and differ in outputs other than `wall_s`.
 std::string differing_sql() {
   const auto outputs = [](const char* table) {
     std::string names;
@@ -95,7 +95,7 @@ class SourceMerge {
       : database_(database), source_(source), rename_prefix_(rename_prefix), merged_(merged) {}
 
   void run() {
-    // the number of each study of the source, with the study in the target
+    // for each study of the source: its number there, and the study in the target
     std::vector<std::pair<std::uint64_t, StudyRow>> places;
     Statement list(source_, fmt::format("SELECT {} FROM studies ORDER BY study_id", kStudyColumns));
     while (list.step()) {
@@ -114,9 +114,9 @@ class SourceMerge {
   }
 
  private:
-  /// Returns the target's study for `study`. Tries the study's own name, and then the name with the
-  /// prefix. Creates a study if the name is free; unites the studies if one recipe begins with the
-  /// other.
+  /// Returns the target's study for the source's `study`. Tries the name of `study`, and then the
+  /// name with the prefix. If the target has no study of that name, creates it. If one recipe
+  /// begins with the other, unites the studies.
   StudyRow place_of(const StudyRow& study) {
     std::string conflict;
     for (const std::string& name : {study.name, rename_prefix_ + study.name}) {

@@ -16,7 +16,7 @@ struct Merged {
   /// number of united studies that grew, because the source had more points
   std::uint64_t studies_grown = 0;
   std::uint64_t results_added = 0;
-  std::uint64_t results_known = 0;      ///< points that already had a result; they keep it
+  std::uint64_t results_known = 0;      ///< number of points that already had a result and keep it
   std::uint64_t failures_replaced = 0;  ///< number of added results that replaced a failure
   /// number of points that both databases have solved with different outputs
   std::uint64_t results_differing = 0;

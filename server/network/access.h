@@ -12,7 +12,7 @@ namespace oblique::server {
 
 struct AccessSettings {
   std::string listen = "127.0.0.1";  ///< numeric address, "localhost", or "*": all addresses
-  std::string keys = {};             ///< path of the server's key file; empty: no keys
+  std::string keys = {};             ///< path of the server's key file; empty without keys
   bool insecure = false;             ///< if true, any peer may connect from any address
 };
 

@@ -18,7 +18,7 @@ constexpr std::size_t kCookieTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kCookieBytes = kRandomNonceBytes + kMacBytes + kCookieTextBytes;
 constexpr std::size_t kWelcomeTextBytes = kKeyBytes + kCookieBytes;
 
-// Offsets and sizes of the parts of INITIATE, without its name, and of the text in its box.
+// Offsets and sizes of the parts of INITIATE (without its name) and of its encrypted text.
 constexpr std::size_t kInitiateBoxAt = kCookieBytes + kCounterBytes;
 constexpr std::size_t kVouchTextBytes = 2 * kKeyBytes;
 constexpr std::size_t kVouchBytes = kRandomNonceBytes + kMacBytes + kVouchTextBytes;

@@ -33,9 +33,9 @@ constexpr std::size_t kReadInHandshake_bytes = 4 * 1024;
 constexpr std::size_t kStepsOfHandshake = 2;
 constexpr std::size_t kStepsATurn = 16;
 constexpr std::size_t kMaxPendingSteps = 64;
-/// To make room for another handshake, the oldest may be ended after handshake_ms / kPartOfOldest,
-/// and a recent one from the same source after handshake_ms / kPartOfNewest. If kPartOfOldest were
-/// 20, thousands of handshakes of a busy process would fail.
+/// To make room for a new handshake, the oldest handshake may be ended at an age of handshake_ms /
+/// kPartOfOldest, or a recent one from the same source at handshake_ms / kPartOfNewest. If
+/// kPartOfOldest were 20, thousands of handshakes of a busy process would fail.
 constexpr std::int64_t kPartOfOldest = 10;
 constexpr std::int64_t kPartOfNewest = 100;
 
@@ -182,8 +182,8 @@ struct Network::Peer {
   bool is_queued = false;  // true if the peer is in its port's queue or in `pending_steps_`
   bool is_paused = false;
   bool is_in_handshake = true;
-  std::uint32_t watched_events = 0;  // 0: not in the epoll set
-  std::size_t held_in_bytes = 0;     // this peer's part of the totals
+  std::uint32_t watched_events = 0;  // 0 if epoll does not watch the peer
+  std::size_t held_in_bytes = 0;     // the peer's parts of the sums in Network
   std::size_t waiting_out_bytes = 0;
   std::shared_ptr<const KeyIdentity> key;
 };
@@ -323,10 +323,10 @@ bool Network::make_room(Port port, const PeerAddress& address) {
   return peers_.size() < limits_.connections || make_room_for_connection(port);
 }
 
-/// Applies the limit for one source address. Ends the oldest handshake if it has had its minimum
-/// time, else a recent one. So most handshakes of slow peers finish, and a fast peer is soon
-/// admitted among many that never finish. Returns false if the new connection must be refused. It
-/// cannot wait, because it would then delay other sources.
+/// Applies the limit on handshakes from one source address. Ends the oldest handshake if it has had
+/// its minimum time, else a recent one. So most handshakes of slow peers finish, and a fast peer is
+/// soon admitted among many that never finish. Returns false if the new connection must be refused:
+/// letting it wait would delay other sources.
 bool Network::make_room_at_source(const PeerAddress& address) {
   constexpr std::size_t kPartForNewest = 8;
   const auto found = handshakes_of_.find(address.source);
@@ -449,9 +449,9 @@ void Network::handshake_ended(Number number, Peer& peer) {
   }
 }
 
-/// Updates the totals, the peer's place in a queue and the awaited events. Must be called after any
-/// change of a peer. While a message of the peer waits, its input stays watched until more input
-/// arrives. Most messages are taken earlier, which saves two system calls.
+/// Updates the sums, the peer's place in a queue and the awaited events. Must be called after any
+/// change of a peer. While a message waits to be taken, the peer's input stays watched until more
+/// arrives. Most messages are taken earlier, so that two system calls are saved.
 void Network::update(Number number, Peer& peer) {
   const Connection& connection = peer.connection;
   update_sums(peer, connection.zmtp().held_bytes(), connection.unsent_bytes());
@@ -502,8 +502,8 @@ void Network::read_paused_again() {
 }
 
 bool Network::has_unread_input(const std::string& identity) const {
-  // A trace on a slow line may take longer to arrive than a worker may be silent. So a message that
-  // is still arriving counts as unread input.
+  // On a slow line a trace may arrive for longer than a worker may be silent. So a message that is
+  // still arriving counts as unread input.
   constexpr std::int64_t kPauseInMessage_ms = 1000;
   const Peer* const peer = find(identity);
   return peer != nullptr &&
@@ -604,8 +604,8 @@ void Network::end(Number number, const std::string& reason, std::optional<Refusa
   peers_.erase(found);
 }
 
-/// Ends a peer that has disconnected. A peer that finds another mechanism in the server's greeting
-/// disconnects without a message, often in the middle of its own greeting.
+/// Ends a peer that has disconnected. A peer whose mechanism differs from that in the server's
+/// greeting disconnects without a message, often in the middle of its own greeting.
 void Network::end_peer_that_left(Number number, const Peer& peer) {
   if (peer.connection.zmtp().is_greeting()) {
     end(number,

@@ -4,7 +4,7 @@
 
 namespace oblique::protocol {
 
-/// The source from which a program was built, and its build.
+/// The commit and the build settings of a program.
 struct Origin {
   std::string version;        ///< "0.2.0"
   std::string commit;         ///< the first 12 digits of the commit; empty if unknown
