@@ -29,8 +29,9 @@ struct NetworkLimits {
   /// Maximum total size of messages that are incomplete or not taken. A peer has at most one
   /// message.
   std::size_t held_in_bytes = limits::kHeldInBytes;
-  /// If the messages of a port have more bytes than this and one of them waits, the port's peers
-  /// are not read. So peers that send faster than results are stored must wait, but stay connected.
+  /// If the messages of a port exceed this size and one of them is complete, the server stops
+  /// reading from the port's peers. So peers that send faster than results are stored must wait,
+  /// but stay connected.
   std::size_t held_in_to_pause_bytes = limits::kHeldInToPauseBytes;
   /// A peer with more unsent output than this is busy.
   std::size_t busy_bytes = limits::kBusyBytes;
@@ -56,16 +57,16 @@ struct Incoming {
 
 struct Disconnect {
   std::string identity;
-  std::string reason;  ///< why the server ended the connection; empty if the peer did
+  std::string reason;  ///< why the server ended the connection; empty if the peer ended it
   /// has a value if the peer was not admitted, or if its key was revoked
   std::optional<RefusalCause> refused = {};
   std::string address = {};  ///< such as 10.0.0.3:4711; empty if `reason` is empty
 };
 
-/// The server's ports and connections, with limits on everything that peers can make it store. A
-/// peer that sends faster than it is served is not read, so TCP slows it down. Peers of a port take
-/// turns, message by message; each turn also runs a few handshake steps. It has no thread and
-/// blocks only in `flush`. All times are milliseconds of a monotonic clock.
+/// The server's ports and connections, with limits on the memory that peers can fill. The server
+/// stops reading from a peer that sends faster than it is served, so TCP slows the peer down. Peers
+/// of a port take turns, message by message; each turn also runs a few handshake steps. The class
+/// has no thread and blocks only in `flush`. All times are milliseconds of a monotonic clock.
 class Network {
  public:
   explicit Network(NetworkLimits limits);

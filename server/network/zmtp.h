@@ -32,7 +32,7 @@ std::string command_frame(std::string_view name, std::string_view data);
 /// handshake such as heartbeats, are faults, because our peers never send them.
 class Zmtp {
  public:
-  /// With `security`, which must outlive this object, the mechanism is CURVE, else NULL.
+  /// With `security` the mechanism is CURVE, else NULL. `security` must outlive this object.
   explicit Zmtp(const PortSecurity* security = nullptr);
 
   /// Adds bytes that were received from the peer.
@@ -91,7 +91,7 @@ class Zmtp {
   State state_ = State::kGreeting;
   std::string buffer_;
   std::size_t begin_ = 0;                          // start of the unexamined bytes in `buffer_`
-  PendingStep pending_step_ = PendingStep::kNone;  // step for the frame at `begin_`
+  PendingStep pending_step_ = PendingStep::kNone;  // how to process the frame at `begin_`
   std::optional<std::string> message_;
   std::string answers_;
   Refusal fault_;

@@ -60,7 +60,7 @@ void take_all_descriptors() {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
     limit.rlim_cur = limit.rlim_max;
-    // If this fails, fewer connections are possible.
+    // An error is ignored: with the lower limit, fewer connections are possible.
     static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
   }
 }

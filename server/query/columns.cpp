@@ -115,10 +115,10 @@ void add_outputs(std::vector<Column>& columns) {
   }
 }
 
-/// Returns whether a key may have several values over the points of a recipe: its axis has several
-/// values, an expression or a distribution, or the blocks differ in it.
+/// Returns whether a key may have several values over the points of a recipe: it has an axis with
+/// several values, an expression or a distribution, or the axes of the key in two blocks differ.
 bool varies(const protocol::Recipe& recipe, std::string_view key) {
-  std::optional<std::string> first;  // the axis in the first block; empty if it has none
+  std::optional<std::string> first;  // axis of the key in the first block; "" if the block has none
   for (const auto& block : recipe.blocks()) {
     const auto axis = std::ranges::find(block.axes(), key, &protocol::Axis::key);
     const bool has_axis = axis != block.axes().end();

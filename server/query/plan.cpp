@@ -42,11 +42,11 @@ struct Part {
 };
 using Parts = std::array<Part, 4>;
 
-/// An expression for an element of a list, which is replaced by SQL over the list's column:
-/// peaks[0].fn_N, peaks[0], fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from
-/// 0, like `seq` in the views; -1 is the last element. A missing element is NULL.
+/// An expression about a list, which is replaced by SQL over the list's column: peaks[0].fn_N,
+/// peaks[0], fn_peaks_N[-1], peaks.count or count_mode('SC SR'). Elements count from 0, like `seq`
+/// in the views; -1 is the last element. A missing element is NULL.
 struct Element {
-  std::size_t tokens = 0;  ///< number of the expression's tokens; 0: not an element of a list
+  std::size_t tokens = 0;  ///< number of tokens; 0 if they do not form such an expression
   std::string column;
   std::string sql;
   std::string unit;
@@ -551,7 +551,7 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   return found;
 }
 
-/// SQL that selects rows of a study. They include all rows that meet the condition.
+/// SQL for rows of a study: all rows that meet the condition, and possibly others.
 struct Rows {
   std::string sql;
   bool are_sorted = false;  ///< true if rows come in order of points without ORDER BY
@@ -582,7 +582,7 @@ Rows rows_of(const QueriedStudy& study, const std::string& where, const Names& n
   std::string join;
   std::string condition;
   if (study.recipe.blocks().empty() || points_in(ranges) == study.points) {
-    // A range would prevent SQLite from looking up the points that the user's condition names.
+    // Without a range, SQLite can look up the points that the user's condition names.
     condition = "1";
   } else if (ranges.size() < 2) {
     condition = ranges.empty()
@@ -631,9 +631,9 @@ std::string name_hint(const std::string& message) {
          "; `oblique columns` lists columns and functions; write texts in single quotes";
 }
 
-/// Throws InputError for a statement that SQLite refuses. Names the first clause that SQLite
-/// refuses, because SQLite's message about the whole statement may quote text that the user did not
-/// write.
+/// Throws InputError for a statement that SQLite refuses. The error names the first clause that
+/// SQLite refuses, because SQLite's message about the whole statement may quote text that the user
+/// did not write.
 [[noreturn]] void refuse(sqlite3* database, const Parts& parts, const std::string& rows) {
   for (std::size_t count = 1; count <= parts.size(); ++count) {
     const Part& last = parts[count - 1];
@@ -648,7 +648,7 @@ std::string name_hint(const std::string& message) {
 }
 
 /// Returns the clauses of `question`; selects the default columns if `question` selects none.
-/// Throws InputError, which names the flag.
+/// Throws InputError for a clause that check_sql_part refuses.
 Parts parts_of(const protocol::StudyQuery& question, const protocol::Recipe& recipe) {
   std::string select = fmt::format("{}", fmt::join(question.select(), ", "));
   if (select.empty()) {
@@ -745,8 +745,8 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
   } catch (const StatementError&) {
     refuse(database, parts, rows.sql);
   }
-  // SQLite names a column after its alias or its text, which may be a translation of the user's
-  // text.
+  // SQLite names a column after its alias or, without an alias, after its SQL, which may be a
+  // translation of the user's text. Only aliases become names here.
   for (std::size_t i = 0; i < plan.columns.size(); ++i) {
     const char* name = sqlite3_column_name(plan.statement.get(), static_cast<int>(i));
     if (name != nullptr && name != columns_sql[i]) {

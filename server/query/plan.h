@@ -15,7 +15,7 @@ namespace oblique::server {
 /// One column of an answer.
 struct PlannedColumn {
   std::string name;
-  std::string unit;  ///< SI unit; empty: a number without unit, a text, or unknown
+  std::string unit;  ///< SI unit; empty for a number without unit, a text, or an unknown unit
 };
 
 /// The statement for a query of a study.
@@ -26,11 +26,11 @@ struct Plan {
 };
 
 /// Turns `question` into a statement. `database` must have passed restrict_to_reading. Throws
-/// solver::InputError for a wrong query, with the flag or column and what is allowed. Throws
-/// StorageError or QueryError if the database cannot be read.
+/// solver::InputError for a wrong query; the message names the flag or column and what is allowed.
+/// Throws StorageError or QueryError if the database cannot be read.
 Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
-/// Returns the error message for an unknown study, with the nearest name.
+/// Returns the error message for an unknown study, which suggests the nearest study name.
 std::string no_such_study(sqlite3* database, const std::string& name);
 
 /// Consecutive points, both ends included.
@@ -45,7 +45,7 @@ struct PointRange {
 /// and possibly other points. Uses only comparisons of an axis of a product block with numbers (=,
 /// <, <=, >, >=, BETWEEN), joined by AND. Widens ranges of an axis by one value at each end,
 /// because another machine may round values differently. `condition` must have passed
-/// check_sql_part; empty: all points.
+/// check_sql_part. Every point meets an empty condition.
 std::vector<PointRange> point_ranges(const protocol::Recipe& recipe, std::string_view condition);
 
 std::uint64_t points_in(const std::vector<PointRange>& ranges);

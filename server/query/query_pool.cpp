@@ -56,9 +56,9 @@ void limit(Resource resource, rlim_t most) {
 }
 
 void confine() {
-  constexpr std::int64_t kHeapBytes = 256 << 20U;  // SQLite sorts and groups in memory
-  constexpr rlim_t kOwnBytes = 512U << 20U;        // memory for the answer
-  // enough for the log's index (-shm), which SQLite may create
+  constexpr std::int64_t kHeapBytes = 256 << 20U;  // for SQLite, which sorts and groups in memory
+  constexpr rlim_t kOwnBytes = 512U << 20U;  // for the rest of the process, such as the answer
+  // SQLite may create the log's index (-shm), which is smaller than this.
   constexpr rlim_t kLargestFile = 64U << 20U;
   constexpr int kNiceness = 5;  // lower priority than the server and the workers
   check_call(prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, "prctl");
@@ -342,7 +342,7 @@ void QueryPool::run() {
       }
       wait();
     } catch (const std::exception&) {
-      // An exception such as std::bad_alloc does not end the pool; the next turn tries again.
+      // After an exception such as std::bad_alloc, the loop pauses and continues.
       std::this_thread::sleep_for(kRetryPause);
     }
   }

@@ -23,7 +23,7 @@ namespace oblique::server {
 /// A query of a client.
 struct QueryJob {
   std::uint64_t ticket;  ///< unique
-  std::string client;    ///< name of the client's key; without keys its connection
+  std::string client;    ///< name of the client's key or, without keys, ID of its connection
   protocol::QueryRequest request;
 };
 

@@ -120,7 +120,8 @@ class Reader {
   protocol::Table query(const std::string& sql, const QueryLimits& limits);
 
   /// Returns the status of the study called `name`, or of all studies if `name` is empty. Leases
-  /// and rate are 0, because only a server has them. Throws QueryError for an unknown name.
+  /// and points per second are 0, because only a server counts them. Throws QueryError for an
+  /// unknown name.
   std::vector<protocol::StudyStatus> study_status(const std::string& name = {});
 
   /// Ends the running query and all later ones. Thread-safe.

@@ -69,8 +69,8 @@ std::size_t quoted_length(std::string_view rest, std::size_t open, char close) {
   return end;
 }
 
-/// Returns the length of a number: 1, 1.5, .5, 1e-5, 0x1F. Counts letters directly after the number
-/// too, so that SQLite refuses them.
+/// Returns the length of a number: 1, 1.5, .5, 1e-5, 0x1F. Includes letters directly after the
+/// number, because SQLite refuses a number with such letters.
 std::size_t number_length(std::string_view rest) {
   std::size_t end = 0;
   while (end < rest.size() && (continues_name(rest[end]) || rest[end] == '.')) {

@@ -23,9 +23,9 @@ struct SqlToken {
 using SqlTokens = std::span<const SqlToken>;
 
 /// Splits `text` into tokens as SQLite does. A comparison such as <= is one token; each other sign
-/// is a token of its own. Throws solver::InputError, whose message is a clause, for a comment, a
-/// parameter, a semicolon, a zero byte, a byte-order mark, or an unclosed quote. The tokens refer
-/// to `text`.
+/// is a token of its own. The tokens refer to `text`. Throws solver::InputError for a comment, a
+/// parameter, a semicolon, a zero byte, a byte-order mark, or an unclosed quote. The message
+/// contains only the reason (`why` of not_allowed).
 std::vector<SqlToken> sql_tokens(std::string_view text);
 
 /// Returns whether a token is the keyword or function `word`, ignoring case.
@@ -64,7 +64,7 @@ std::optional<double> decimal_number(std::string_view text);
 /// A function that queries may use: one of ours, or SQLite's.
 struct SqlFunction {
   std::string_view name;
-  std::string_view form;     ///< the call as shown in listings; empty: not listed
+  std::string_view form;     ///< the call as shown in listings; empty if listings omit it
   std::string_view meaning;  ///< one line
   /// true for an aggregate function; min and max aggregate only with one argument
   bool aggregates = false;

@@ -48,7 +48,7 @@ class LossHistory {
  public:
   /// Adds a loss. A process counts once, but every loss of kNoProcess counts.
   void add(const Loss& loss) {
-    // After this number of losses, only those with `alone` are added.
+    // After this number of losses, only losses with `alone` are added.
     constexpr std::size_t kMaxNoted = 16;
     const auto known = std::ranges::find(losses_, loss.process, &Loss::process);
     if (loss.process != kNoProcess && known != losses_.end()) {

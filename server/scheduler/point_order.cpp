@@ -14,7 +14,7 @@ namespace {
 
 struct Piece {
   Interval points;
-  std::uint64_t fall;  ///< number of the fall
+  std::uint64_t fall;  ///< index of the fall in Falls::heads
 };
 
 /// The points from `first` on, split into pieces with one fall each, and the first open point of
@@ -176,7 +176,7 @@ IntervalSet PointOrder::places(const IntervalSet& points) const {
       at += count;
     }
   });
-  std::ranges::sort(parts, {}, &Interval::begin);  // so that each insertion below is at the end
+  std::ranges::sort(parts, {}, &Interval::begin);  // inserting sorted parts is fast
   IntervalSet places;
   places.insert(parts);
   return places;

@@ -189,8 +189,8 @@ void Scheduler::on(const StudyRemoved& event) {
   ready_workers_.unpark_all();  // workers may have waited for suspect points of this study
 }
 
-/// Sets `served` to the smallest value of all open studies with this priority, so that a study that
-/// becomes open neither waits for others nor catches up with them.
+/// Sets the study's `served` to the smallest `served` of the studies in `free_` with its priority.
+/// So a study that becomes open neither waits for the others nor delays them.
 void Scheduler::level(Study& study) const {
   const std::int64_t rank = -std::int64_t{study.priority};
   const auto least = free_.lower_bound({rank, 0.0, 0});

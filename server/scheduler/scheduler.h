@@ -28,8 +28,8 @@ struct StudyCounts {
   std::uint64_t left_out;  ///< number of points left out by a filter, as reported by workers so far
   std::uint64_t leased;
   bool cancelled;
-  std::string solver_version;  ///< solver version of its results; empty without results
-  bool is_of_other_solver;     ///< true if its open points need another solver version
+  std::string solver_version;  ///< solver version of the study's results; empty without results
+  bool is_of_other_solver;     ///< true if the study's open points need another solver version
 
   std::uint64_t open() const { return points - completed; }
   std::uint64_t solved() const { return completed - std::min(completed, failed + left_out); }
@@ -132,21 +132,21 @@ class Scheduler {
   WorkerGroups groups(std::int64_t now_ms) const;
   /// Number of leased batches.
   std::size_t leases() const { return leases_.size(); }
-  /// Returns the recent thread time per point [s]; 0: unknown.
+  /// Returns the recent thread time per point [s]; 0 if it is unknown.
   double thread_s_per_point() const { return pace_points_ > 0.0 ? pace_s_ / pace_points_ : 0.0; }
   /// Throws std::out_of_range for an unknown worker.
   WorkerCounts worker(WorkerId worker, std::int64_t now_ms) const;
-  /// Returns the time since the worker's last message [ms]. Throws std::out_of_range if it is
-  /// unknown.
+  /// Returns the time since the worker's last message [ms]. Throws std::out_of_range for an unknown
+  /// worker.
   std::int64_t silent_ms(WorkerId worker, std::int64_t now_ms) const;
 
   /// Throws std::logic_error if the state contradicts itself: a point is in two places or in none,
   /// a lease has no worker or study, a leased point has no lease, or a point has two leases that
-  /// are not twins.
+  /// are not twins (Lease::twin).
   void check_invariants() const;
 
  private:
-  /// Sort key of studies that wait for workers: minus the priority, then `served`, then the number.
+  /// Sort key of studies that wait for workers: minus the priority, then `served`, then the ID.
   using Rank = std::tuple<std::int64_t, double, StudyId>;
   struct Study {
     StudyPoints points;
@@ -155,9 +155,9 @@ class Scheduler {
     bool paused;
     bool finished;
     std::int32_t priority = 0;
-    /// Number of batches leased since the study was last open. A long batch counts for several.
+    /// Leased batches, counted from the value that `level` set. A long batch counts for several.
     double served = 0.0;
-    std::string solver_version{};  ///< solver version of its results and leases; empty without both
+    std::string solver_version{};  ///< solver version of results and leases; empty without them
     std::set<LeaseId> leases{};
     bool held = false;
     std::optional<Rank> rank{};  ///< the study's entry in `free_`
@@ -172,7 +172,7 @@ class Scheduler {
     Batch batch;
     bool alone;  ///< true if the points are suspect; the worker then gets no other lease
     std::int64_t granted_ms;
-    LeaseId twin = 0;  ///< another worker's lease for the rest of this batch; 0: none
+    LeaseId twin = 0;  ///< another worker's lease for the rest of this batch; 0 if there is none
   };
   /// How fast a worker solves points of a study.
   struct Pace {
@@ -183,10 +183,10 @@ class Scheduler {
     double solved_busy_s = 0.0;
     double solved = 0.0;
     std::uint64_t last_batch_points = 0;  ///< size of the last batch, or the wanted size if larger
-    std::uint64_t last_end = 0;           ///< place at which the last batch ended; 0: no batch yet
-    std::uint64_t held_points = 0;        ///< number of points in its leases
+    std::uint64_t last_end = 0;     ///< place at which the last batch ended; 0 before the first one
+    std::uint64_t held_points = 0;  ///< number of points in the worker's leases of the study
 
-    double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0: unknown
+    double s_per_point() const { return points > 0.0 ? busy_s / points : 0.0; }  ///< 0 if unknown
     double s_per_solved() const { return solved > 0.0 ? solved_busy_s / solved : 0.0; }
   };
   struct Worker {
@@ -194,14 +194,14 @@ class Scheduler {
     std::uint32_t credit = 0;
     bool is_busy = false;  ///< the worker does not read its messages, so it gets no batch
     ProcessNumber process = kNoProcess;
-    LeaseId probe = 0;                        ///< lease of its probe; 0: it has no probe
-    std::optional<std::int64_t> probed_ms{};  ///< time at which it got its last probe
+    LeaseId probe = 0;                        ///< lease of the worker's probe; 0 without a probe
+    std::optional<std::int64_t> probed_ms{};  ///< time at which the worker got its last probe
     std::int64_t last_heard_ms;
     std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold leases
     std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
     std::uint64_t solved_points = 0;
     std::set<LeaseId> leases;
-    std::map<StudyId, std::uint64_t> defined;  ///< points in each recipe that the worker has
+    std::map<StudyId, std::uint64_t> defined;  ///< size of each study whose recipe the worker has
     std::map<StudyId, Pace> paces;
   };
   using Effects = std::vector<Effect>;
@@ -241,7 +241,7 @@ class Scheduler {
   void remove_worker(WorkerId worker, WorkerEnd how);
   bool reports_foreign_points(const ResultsReceived& event) const;
   void update_pace(Worker& worker, const ResultsReceived& event);
-  /// Shortest thread time per point of all workers, by study; 0: unknown.
+  /// Shortest thread time per point that any worker needs, by study; 0 if it is unknown.
   using FastestPaces = std::map<StudyId, double>;
   double fastest_pace(StudyId id, FastestPaces& known) const;
   void end_stalled();
@@ -286,7 +286,7 @@ class Scheduler {
   SchedulerSettings settings_;
   std::string solver_version_;
   WorkerProcesses processes_{settings_.most_absent_processes};
-  // times of losses of new processes that held points
+  // times at which new processes that held points were lost
   std::deque<std::int64_t> vanished_ms_;
   std::map<StudyId, Study> studies_;
   std::set<Rank> free_;         // studies with free points to lease, in the order of service
@@ -295,7 +295,7 @@ class Scheduler {
   std::map<WorkerId, Worker> workers_;
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // workers with credit
-  // worker that finishes its leases and then gets suspect points; 0: none
+  // worker that will get suspect points when its leases have ended; 0 if there is none
   WorkerId draining_ = 0;
   std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;

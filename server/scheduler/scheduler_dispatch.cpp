@@ -66,7 +66,7 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   const StudyId study = std::get<StudyId>(*free_.begin());
   const BatchSize wanted = batch_size_for(worker, study, true);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
-  // Stores the wanted size. If the run of points ends early, the batch is smaller, but that says
+  // Stores the wanted size. A batch that is smaller because the run of points ends early says
   // nothing about the worker's capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
@@ -143,9 +143,9 @@ StudyId Scheduler::next_suspect_study(const Worker& worker) const {
   return found == suspects_.end() ? 0 : *found;
 }
 
-/// Returns the suspicion of the points that the worker may get, or nothing. A risky point first
-/// goes to the worker that has been proven longest, because that worker is least likely to be lost
-/// for other reasons. An unproven worker gets a probe instead of these points.
+/// Returns the suspicion level of the points that the worker may get, or nothing. A risky point
+/// first goes to the worker that has been proven longest, because that worker is least likely to be
+/// lost for other reasons. The caller sends an unproven worker a probe instead.
 std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
                                                 const Worker& worker) const {
   if (points.has(Suspicion::kRisky) &&

@@ -33,8 +33,8 @@ struct SchedulerSettings {
   /// the end of a study, and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
   double shortest_batch_s = 0.01;  ///< shorter batches cost too much in transport
-  /// If no other points can be leased, a batch that takes longer than this, and `straggler_factor`
-  /// times as long as expected, is also leased to a second worker. Batches with losses are
+  /// If no other points can be leased, a second worker also gets each batch that takes longer than
+  /// this and longer than `straggler_factor` times its expected duration. Batches with losses are
   /// excluded.
   std::int64_t straggler_after_ms = 1000;
   double straggler_factor = 4.0;
@@ -84,7 +84,7 @@ struct StudyAdded {
   bool cancelled = false;
   bool paused = false;
   std::int32_t priority = 0;
-  std::string solver_version{};  ///< solver version of its results; empty without results
+  std::string solver_version{};  ///< solver version of the study's results; empty without results
   bool held = false;
   std::uint64_t left_out = 0;  ///< number of completed points that a filter leaves out
 };
@@ -129,11 +129,11 @@ struct StudyGrown {
 struct StudyRemoved {
   StudyId study;
 };
-/// A worker has connected. Worker numbers are never reused.
+/// A worker has connected. It replaces earlier workers of its process. Its number is never reused.
 struct WorkerJoined {
   WorkerId worker;
   std::uint32_t threads;
-  std::string process{};  ///< ID of its process, whose earlier connection has ended; empty: unknown
+  std::string process{};  ///< ID of the worker's process; empty if unknown
 };
 struct CreditGiven {
   WorkerId worker;
@@ -151,7 +151,7 @@ struct ResultsReceived {
 };
 /// The results of a StoreResults or StoreFailure effect are durable.
 struct ResultsStored {
-  WorkerId worker;  ///< 0: nothing to acknowledge
+  WorkerId worker;  ///< 0 if there is no message to acknowledge
   StudyId study;
   std::uint64_t sequence;
   std::vector<PointOutcome> outcomes;
@@ -215,7 +215,7 @@ struct SendBatch {
   std::uint64_t count() const { return size_of(points); }
 };
 /// Store these results, then pass ResultsStored to the scheduler. Each Results message causes this
-/// effect, even if there is nothing to store: the message is acknowledged after all earlier
+/// effect, even if there is nothing to store, because the acknowledgement must follow all earlier
 /// commits.
 struct StoreResults {
   WorkerId worker;

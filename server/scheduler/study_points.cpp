@@ -9,8 +9,8 @@
 namespace oblique::server {
 namespace {
 
-/// Returns a batch end near `end`, at most `most`, that does not split the group `cut`: if two
-/// workers share a group, both solve its falls. A group that is too large is split.
+/// Returns an end near `end`, at most `most`, for a batch from `first`. The end does not split the
+/// group `cut`, unless the group is too large: if two workers share a group, both solve its falls.
 std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_t end,
                           std::uint64_t most) {
   if (cut.begin > first && 2 * (cut.begin - first) >= end - first) {
@@ -28,7 +28,7 @@ StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t 
                          const LossLimits& limits)
     : table_(std::move(table)), limits_(limits), completed_(std::move(completed)) {
   completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());
-  // A database that another program has edited may contain a larger number.
+  // A database that another program has edited may count more left-out than completed points.
   left_out_ = std::min(left_out, completed_.size());
   fresh_.insert(0, size());
   completed_.for_each(
@@ -62,7 +62,7 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
 
 void StudyPoints::rest(bool has_leases) {
   table_.release();
-  if (is_complete() && !has_leases) {  // without an order, places equal points
+  if (is_complete() && !has_leases) {  // without an order, places equal point numbers
     order_ = {};
     was_arranged_ = false;
     begun_until_ = 0;
@@ -235,7 +235,7 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
   const std::uint64_t room = free.end - free.begin;
   const std::uint64_t most = free.begin + std::min(std::max(points, wanted.most_points), room);
   std::uint64_t end = free.begin + std::min(points, room);
-  // Takes at least `groups` whole groups if they end before `most`.
+  // The batch gets up to `wanted.groups` whole groups if they end at `most` or earlier.
   std::uint64_t groups_end = group.end;
   for (std::uint64_t groups = 1; groups < wanted.groups && groups_end < most; ++groups) {
     const std::uint64_t next = order.group_at(table, groups_end).end;
@@ -273,10 +273,10 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
 }
 
-/// Returns fresh points that extend a batch, which ends at `end` and has `leased` of `enough`
-/// points. Only a few completed points may lie in between, as in a fine grid that has reused
-/// results of a coarse grid. Returns nothing if the next fresh points are before `run_end`, where
-/// the batch was cut, or if their group does not fit into the batch.
+/// Returns the next fresh points if they can extend a batch that ends at `end` and has `leased` of
+/// `enough` points. Only a few completed points may lie in between, as in a fine grid that has
+/// reused results of a coarse grid. Returns nothing if the batch left fresh points before
+/// `run_end`, or if the group of the next fresh points does not fit into the batch.
 std::optional<Interval> StudyPoints::fresh_near(std::uint64_t end, std::uint64_t run_end,
                                                 std::uint64_t enough, std::uint64_t leased) const {
   constexpr std::uint64_t kNear = 64;
@@ -317,8 +317,8 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   if (!order_.is_arranged()) {
     return fresh_.front();
   }
-  // The worker that began the group continues with its first falls, so this one gets the last
-  // falls.
+  // The worker that began the last group continues with the first falls of the rest, so this worker
+  // gets the last falls.
   const Interval last = fresh_.back();
   return Interval{last.begin + (last.end - last.begin) / 2, last.end};
 }

@@ -17,15 +17,15 @@ namespace oblique::server {
 
 /// The size of a batch that a worker wants.
 struct BatchSize {
-  std::uint64_t points;      ///< target number of points; a batch ends with a group near it
+  std::uint64_t points;      ///< target number of points; the batch ends at a nearby end of a group
   std::uint64_t groups = 1;  ///< minimum number of groups, if they fit into `most_points`
-  /// maximum number of points if that completes groups; 0: same as `points`
+  /// maximum number of points if the batch is enlarged to complete groups; 0: same as `points`
   std::uint64_t most_points = 0;
   /// Number of falls that the worker solves side by side. If the study is arranged now, its groups
-  /// get this size. 0: the study must not be arranged, because leases refer to places.
+  /// get this size. Must be 0 while leases refer to places; the study is then not arranged.
   std::uint64_t falls = 0;
   /// The place at which the worker's last batch ended. The rest of that batch's last group comes
-  /// first, because the worker has already solved its falls.
+  /// first, because the worker has already solved the group's falls.
   std::optional<std::uint64_t> follows{};
 };
 
@@ -59,21 +59,22 @@ struct Batch {
 class StudyPoints {
  public:
   /// `completed` contains the completed points, among them `left_out` points that a filter leaves
-  /// out. If the study is complete, does not make the table.
+  /// out. If the study is complete, its PointTable is not made.
   StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
               const LossLimits& limits);
 
   std::uint64_t size() const { return table_.size(); }
-  /// Returns whether the points have several models. Makes the table if necessary.
+  /// Returns whether the points have several models. Makes the PointTable if necessary.
   bool has_models() const { return table_->models() > 1; }
-  /// Releases the table until the next lease, and the order of a complete study without leases.
+  /// Releases the PointTable until the next lease. If the study is complete and without leases,
+  /// also releases the order.
   void rest(bool has_leases);
   /// The current mapping between points and places.
   const PointOrder& order() const { return order_; }
 
-  /// Leases returned sound points or, if there are none, fresh points: first the rest of the group
-  /// at `wanted.follows`, then groups that no worker has begun, then the second half of the rest of
-  /// the last group. Returns nothing if no point is left.
+  /// Leases returned sound points or, if there are none, fresh points. Fresh points come first from
+  /// the rest of the group at `wanted.follows`, then from groups that no worker has begun, then
+  /// from the second half of the last fresh points. Returns nothing if no point is left.
   std::optional<Batch> take(const BatchSize& wanted);
   /// Leases returned points with this level of suspicion.
   std::optional<Batch> take(Suspicion suspicion, const BatchSize& wanted);
@@ -83,11 +84,11 @@ class StudyPoints {
     std::uint32_t attempts;
     std::uint32_t alone;  ///< number of workers that were lost while they held only this point
   };
-  /// Returns the points that began to fail at `until_ms` or earlier, and moves them to committing.
+  /// Moves points that have been kFailing since `until_ms` or earlier to committing. Returns them.
   std::vector<Failure> take_due_failures(std::int64_t until_ms);
 
-  /// Returns the leased points at the places `parts` to the sets of returned points, with the given
-  /// history, at `now_ms`. `parts` are in order. Points between the parts do not change.
+  /// Moves the leased points at the places `parts` to the returned points, with the given history
+  /// and the time `now_ms`. `parts` are in order. Points between the parts do not change.
   void give_back(std::span<const Interval> parts, std::uint32_t attempts, const LossHistory& losses,
                  std::int64_t now_ms);
 
@@ -123,8 +124,8 @@ class StudyPoints {
   bool may_leave_out(const IntervalSet& points) const;
   /// Returns whether any returned points have this level of suspicion.
   bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
-  /// Returns the time at which the first points of this level, by place, were returned. There must
-  /// be such points.
+  /// Of the returned points of this level, takes the one at the lowest place and returns when it
+  /// was returned. There must be such a point.
   std::int64_t returned_ms(Suspicion suspicion) const {
     return returned(suspicion).begin()->second.returned_ms;
   }

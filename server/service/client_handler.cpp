@@ -15,7 +15,7 @@
 namespace oblique::server {
 namespace {
 
-/// Returns the number of studies or workers in a reply. A request for 0 gets the maximum.
+/// Returns the number of studies or workers for a reply. `requested` 0 stands for the maximum.
 int page_size(std::uint32_t requested) {
   return static_cast<int>(requested == 0 ? limits::kListed : std::min(requested, limits::kListed));
 }

@@ -118,7 +118,7 @@ class ClientHandler {
   StudyChanges& changes_;
   PendingRequests pending_;  // by ticket
   std::uint64_t last_ticket_ = 0;
-  std::size_t point_checks_ = 0;  // running checks of traces, also for absent clients
+  std::size_t point_checks_ = 0;  // running checks of trace requests, also of absent clients
   // ticket of the trace order that a worker has not answered yet
   std::map<WorkerId, std::uint64_t> orders_;
   bool stopping_ = false;

@@ -73,12 +73,12 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
   });
 }
 
-/// Returns the reply without the trace, or an error. If the table is not made, may be called on the
-/// check thread.
+/// Returns the reply without the trace, or an error. If `is_table_made` is false, may be called on
+/// the check thread.
 protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is_table_made,
                                                 std::uint64_t point) {
   try {
-    // Makes a separate table if the study has none, because this may be the check thread.
+    // If the study has no table, makes a separate one, because this may be the check thread.
     const auto table =
         is_table_made ? study.get() : StudyTable(study.recipe_bytes(), study.size()).get();
     const std::string error = point >= table->size()

@@ -25,7 +25,7 @@ struct ServiceSettings : WorkerSessionSettings {
   ClientHandlerSettings clients;
   StudyBounds bounds;
   std::uint64_t last_study_id = 0;
-  /// Only points of this study are leased; empty: points of all studies.
+  /// Only points of this study are leased. If empty, points of all studies are leased.
   std::string only_study{};
 };
 

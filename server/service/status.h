@@ -20,7 +20,7 @@ class PointRates {
  public:
   using Id = std::uint64_t;
 
-  /// Adds completed points. `since_ms` is the start of the first interval of a new ID.
+  /// Adds completed points. The rate of a new ID is measured from `since_ms` on.
   void add(Id id, std::uint64_t points, std::int64_t since_ms, std::int64_t now_ms) {
     Recent& recent = recent_.try_emplace(id, Recent{since_ms}).first->second;
     if (recent.points.empty() || now_ms - recent.points.back().at_ms >= kResolution_ms) {

@@ -22,7 +22,7 @@ constexpr const char* kDeletedState = "deleted";
 std::string unknown_study(const std::string& name, const StudyStates& states) {
   const std::string nearest = states.nearest(name);
   const std::string shown = protocol::shortened(name, kLongestShownName);
-  if (!name.empty() && nearest == name) {  // the request also had a study number, which is wrong
+  if (!name.empty() && nearest == name) {  // the request's study number does not match the name
     return fmt::format("study name \"{}\" and study number do not match: see `oblique studies`",
                        shown);
   }
@@ -137,7 +137,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   try {
     growth = study.table.growth_to(read.table);
   } catch (const std::runtime_error&) {
-    // A recipe of another version may be unreadable.
+    // A recipe that another version of the server has stored may be unreadable.
   }
   if (growth.kind != Growth::Kind::kSame) {
     grow(client, *known, read, growth, priority, now);
@@ -485,7 +485,7 @@ void StudyChanges::write_part(StudyId id, std::uint64_t first_point) {
         ReuseResults{id, study.table.get(), first_point, core_.solver_version, outcome},
         [this, id, outcome](Instant now) { part_stored(id, *outcome, now); },
         [this, id](const std::string& error, Instant /*now*/) { part_refused(id, error); });
-  } catch (const std::runtime_error& error) {  // the recipe may be of another version
+  } catch (const std::runtime_error& error) {  // another server version may have stored the recipe
     log(id, fmt::format("reuses no results: {}", error.what()));
     write_end(id);
   }

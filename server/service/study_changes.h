@@ -55,13 +55,13 @@ class StudyChanges {
   /// long, or the study is gone.
   void release_replies(Instant now);
 
-  /// A lookup ends early if this number of probes, or this time, gives no result.
+  /// A lookup ends early after this number of probes, or after this time, without a result.
   static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
   /// Looks up results of other studies for all open points, in parts. The scheduler must hold the
   /// study meanwhile. If the study is cancelled, the lookup ends after its current part.
   void look_up(StudyId id, Instant now);
-  /// Stops all lookups after their current part. The next server continues them.
+  /// Stops all lookups after their current part. The next start of the server continues them.
   void stop_lookups() { lookups_stop_ = true; }
 
  private:

@@ -44,7 +44,7 @@ struct StudyRecord {
   std::string created_at;
   std::int32_t priority = 0;
   IntervalSet failures{};      ///< points whose row has an error
-  std::int64_t since_ms{};     ///< start of the period over which the rate is computed
+  std::int64_t since_ms{};     ///< start of the period for the study's points per second
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
   Reuse reuse{};
   StudyState state = StudyState::kRunning;
@@ -69,13 +69,13 @@ class StudyStates {
   std::optional<StudyId> find(std::string_view name) const;
   /// Returns the durable study with number `id` or, if `id` is 0, with that name.
   std::optional<StudyId> find_durable(std::string_view name, StudyId id = 0) const;
-  /// Returns the nearest name; empty if none is near or there are too many studies.
+  /// Returns the study name nearest to `name`; empty if none is near or too many studies exist.
   std::string nearest(std::string_view name) const;
   /// Returns the durable study with the lowest number above `id`.
   std::optional<StudyId> durable_after(StudyId id) const;
   bool contains(StudyId id) const { return studies_.contains(id); }
   const StudyRecord& record(StudyId id) const { return studies_.at(id); }
-  /// Returns the record for changes of anything but name and state, which have their own functions.
+  /// Returns the record for changes. Name and state must be changed by their own functions.
   StudyRecord& record(StudyId id) { return studies_.at(id); }
   /// Returns whether the study is neither done nor cancelled.
   bool is_open(StudyId id) const { return unfinished_.contains(id); }

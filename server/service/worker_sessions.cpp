@@ -120,7 +120,7 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
       break;
     }
     case Kind::kTrace:
-      input.events.emplace_back(CreditGiven{worker, 0});  // a sign of life of the worker
+      input.events.emplace_back(CreditGiven{worker, 0});  // counts as a sign of life of the worker
       input.trace_of = worker;
       input.trace = std::move(*message.mutable_trace());
       break;
@@ -358,7 +358,8 @@ void WorkerSessions::send_stopping(WorkerId worker) {
   send(worker, message);
 }
 
-/// `lease` is that of the batch in the frame, or 0. A frame that cannot be delivered is an event.
+/// `lease` is the lease of the batch in the frame; 0 if the frame contains no batch. If the frame
+/// cannot be delivered, adds a WorkerUnreachable or WorkerBusy event.
 void WorkerSessions::send_frame(WorkerId worker, const std::string& frame, LeaseId lease) {
   const auto known = workers_.find(worker);
   if (known == workers_.end()) {
