@@ -27,20 +27,20 @@ struct WorkerSessionSettings {
 /// A connected worker, from its WorkerHello.
 struct WorkerRecord {
   std::string identity;
-  AddWorker row;                  ///< the worker's row, stored with its first result
+  AddWorker row;                  ///< row of `workers`, stored with the worker's first result
   std::string key;                ///< name of the worker's key; empty without keys
   std::string host;               ///< name of the worker's machine
   std::int64_t last_sent_ms = 0;  ///< time of the last message to the worker, rounded up to a tick
   bool was_sent = false;          ///< true if a message was sent since the last tick
-  bool is_busy = false;           ///< value of the last WorkerBusy event
+  bool is_busy = false;           ///< `is_busy` of the worker's last WorkerBusy event
   bool has_row = false;           ///< true if the database has a row for the worker
 };
 
 /// The content of a worker's frame.
 struct WorkerInput {
   std::vector<Event> events;  ///< events for the scheduler, in order
-  protocol::Results results;  ///< the message from which a ResultsReceived was made
-  WorkerId trace_of = 0;      ///< worker that sent `trace`; 0: none
+  protocol::Results results;  ///< message that a ResultsReceived in `events` describes
+  WorkerId trace_of = 0;      ///< worker that sent `trace`; 0 if there is no trace
   protocol::Trace trace;
 };
 
@@ -48,7 +48,7 @@ struct WorkerInput {
 /// Refuses messages that correct workers never send. Frames may be malicious. Not thread-safe.
 class WorkerSessions {
  public:
-  /// `lost_after_ms` must equal the scheduler's value.
+  /// `lost_after_ms` must equal `lost_after_ms` of the scheduler.
   WorkerSessions(WorkerSessionSettings settings, std::int64_t lost_after_ms, Ports& ports,
                  PeerLog& log, const WriteLedger& ledger)
       : settings_(std::move(settings)),
@@ -67,7 +67,7 @@ class WorkerSessions {
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);
-  /// `lease` is the lease of the batch in the message; 0: it has none.
+  /// `lease` is the lease of the batch in the message; 0 if the message has no batch.
   void send(WorkerId worker, const protocol::ServerToWorker& message, LeaseId lease = 0) {
     send_frame(worker, protocol::encode(message), lease);
   }
@@ -84,7 +84,7 @@ class WorkerSessions {
   /// Sends a HeartbeatReply to each worker that has sent nothing, or was sent nothing, for 1.25
   /// heartbeat intervals. Must be called several times a second.
   void tick(const Silence& silent_ms, Instant now);
-  /// Returns events that occurred while messages were sent: unreachable or busy workers.
+  /// Returns the WorkerUnreachable and WorkerBusy events that occurred while messages were sent.
   std::vector<Event> take_events();
 
   /// Returns null for an unknown worker.

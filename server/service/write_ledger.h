@@ -14,8 +14,8 @@
 namespace oblique::server {
 
 struct LedgerLimits {
-  /// Maximum size of unstored results [bytes]. Above it no message of a worker is read. From a
-  /// quarter of it on no batch is sent until the size falls below an eighth.
+  /// Maximum size of unstored results [bytes]. Above it no message of a worker is read. At a
+  /// quarter of it, sending batches stops until the size is below an eighth of it.
   std::size_t bytes = limits::kUnstoredBytes;
   /// Maximum number of unstored results, because many small messages use memory too.
   std::size_t writes = limits::kUnstoredWrites;
@@ -43,7 +43,7 @@ class WriteLedger {
   /// Refuses all pending writes, in order, because the database is gone.
   void abandon(const std::string& error, Instant now);
 
-  /// Sets why the database accepts no changes; empty if it accepts them again.
+  /// Sets the reason why the database accepts no changes; an empty text if it accepts changes.
   void set_fault(const std::string& error) { fault_ = error; }
 
   /// Must be called several times a second.
@@ -54,7 +54,7 @@ class WriteLedger {
 
   /// Returns why the database accepts no changes, or an empty text.
   const std::string& fault() const { return fault_; }
-  /// Returns whether the file is gone, so that nothing more can be stored.
+  /// Returns whether the database file is gone, so that nothing more can be stored.
   bool is_gone() const { return is_gone_; }
   bool is_empty() const { return writes_.empty(); }
   /// Returns the size of pending results [bytes].
@@ -81,7 +81,7 @@ class WriteLedger {
     std::size_t writes = 0;
     std::size_t bytes = 0;
   };
-  /// Returns the load to which the write belongs: changes or results.
+  /// Returns the sum in which the write is counted: `changes_` or `results_`.
   Load& load_of(const Write& write) { return write.on_refused ? changes_ : results_; }
   void weigh();
 
@@ -94,7 +94,7 @@ class WriteLedger {
   bool is_behind_ = false;
   std::string fault_;
   bool is_gone_ = false;
-  std::uint64_t oldest_ = 0;  // oldest pending ticket at the last tick; 0: none
+  std::uint64_t oldest_ = 0;  // oldest pending ticket at the last tick; 0 if none was pending
   std::int64_t oldest_since_ms_ = 0;
   bool is_slow_ = false;
 };

@@ -46,7 +46,7 @@ struct AddStudy {
   std::string created_at;
   std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the submitter's key; empty without keys
-  bool reuses = false;            ///< true if results of other studies are looked up
+  bool reuses = false;            ///< true if results of other studies are to be reused
 };
 
 struct SetPriority {
@@ -55,7 +55,7 @@ struct SetPriority {
   std::int32_t priority = 0;
 };
 
-/// Deletes the rows of the given points that have failed. A done study runs again.
+/// Deletes the rows of the failed points among `points`. A done study runs again.
 struct ForgetFailures {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
@@ -72,7 +72,7 @@ struct SetStudyState {
 
 struct AddWorker {
   static constexpr bool kNeedsFullSync = false;
-  static constexpr std::uint64_t study_id = 0;  ///< a worker belongs to no study
+  static constexpr std::uint64_t study_id = 0;  ///< 0, because a worker belongs to no study
   std::uint64_t worker_id;
   std::string name;
   std::uint32_t threads;
@@ -92,7 +92,7 @@ struct AddResults {
   std::uint32_t attempt;
   std::string solved_at;
   std::vector<protocol::PointResult> results;
-  IntervalSet left_out{};         ///< points completed without a row
+  IntervalSet left_out{};         ///< completed points that get no row
   std::size_t message_bytes = 0;  ///< size of the worker's message [bytes]
 };
 
@@ -100,13 +100,13 @@ struct AddResults {
 struct GrowStudy {
   static constexpr bool kNeedsFullSync = true;
   std::uint64_t study_id;
-  StudyTable table;  ///< contains all points, also the earlier ones
+  StudyTable table;  ///< all points of the study, including the earlier ones
   std::int32_t priority = 0;
   std::string changed_at;
-  bool reuses = false;  ///< true if results of other studies are looked up
+  bool reuses = false;  ///< true if results of other studies are to be reused
 };
 
-/// Outcome of a ReuseResults. It is valid when that change is durable.
+/// Outcome of a ReuseResults change. It is valid as soon as the change is durable.
 struct ReusedResults {
   IntervalSet points;                              ///< points that got a row
   std::map<std::string, std::uint64_t> origins{};  ///< number of copied rows, by source study
@@ -116,8 +116,8 @@ struct ReusedResults {
 };
 
 /// Looks up one part of the study's open points, from `first_point` on, in the results of other
-/// studies. Copies the rows that it finds. Copies only rows of `solver_version`. The two studies
-/// must both request estimated errors, or neither.
+/// studies, and copies the rows that it finds. A row must be of `solver_version`. Its study and
+/// this study must both request estimated errors, or neither.
 struct ReuseResults {
   static constexpr bool kNeedsFullSync = false;
   std::uint64_t study_id;
@@ -139,7 +139,7 @@ struct RenameStudy {
   std::string name;
 };
 
-/// Deletes a study: frees its name and makes the database drop its late results.
+/// Deletes a study and frees its name. The database then ignores results that arrive for the study.
 /// `Storage::clear_away` later deletes its rows in parts.
 struct DeleteStudy {
   static constexpr bool kNeedsFullSync = true;

@@ -82,7 +82,7 @@ std::optional<Interval> CompletedRanges::range_before(std::uint64_t study_id, st
   return range;
 }
 
-/// Deletes the ranges that begin in [first, last]. Returns the largest deleted end, or 0.
+/// Deletes the ranges that begin in [first, last]. Returns the largest of their ends, or 0.
 std::uint64_t CompletedRanges::take_out(std::uint64_t study_id, std::uint64_t first,
                                         std::uint64_t last) {
   std::uint64_t end = 0;

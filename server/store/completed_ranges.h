@@ -12,9 +12,9 @@ namespace oblique::server {
 /// Reads the completed points of a study. Throws StorageError.
 IntervalSet completed_points(sqlite3* database, std::uint64_t study_id);
 
-/// Recomputes the completed points of each study with `counted` = 0 as the points that have a row.
-/// Left-out points become open, and a worker examines them again. Must be called in a transaction.
-/// Throws StorageError.
+/// For each study whose column `counted` is 0: sets the completed points to the points that have a
+/// row. Left-out points become open, and a worker examines them again. Must be called in a
+/// transaction. Throws StorageError.
 void count_completed_points(sqlite3* database);
 
 /// Computes `left_out` and `reused_points` of a study from its rows and completed ranges. Sets its
@@ -44,7 +44,7 @@ class CompletedRanges {
   /// Forgets the added points, because the transaction was rolled back.
   void forget() { gathered_.clear(); }
 
-  /// Returns the stored ranges that overlap `points`. They may begin before it or end after it.
+  /// Returns the stored ranges that overlap `points`, including their parts outside `points`.
   IntervalSet overlapping(std::uint64_t study_id, const Interval& points);
   /// Returns the points in `points` that are neither completed nor added.
   IntervalSet open_points(std::uint64_t study_id, const IntervalSet& points);

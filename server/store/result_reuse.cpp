@@ -14,7 +14,7 @@
 namespace oblique::server {
 namespace {
 
-/// Maximum number of points, and of lookups, in one change: about 50 ms if all have a result.
+/// Maximum number of points, and of lookups, in one change; the change takes at most about 50 ms.
 constexpr std::uint64_t kPart = 4096;
 
 /// Selects study, point and study name of the first row of another study that has these inputs, is
@@ -112,7 +112,7 @@ class Lookup {
   ModelRows& models_;
   Statement find_;
   Statement copy_;
-  // number of the row of `models` by model number of the recipe; 0: none
+  // row number in `models` by model number in the recipe; 0 for a model without a row
   std::unordered_map<std::uint64_t, std::int64_t> model_ids_;
 };
 

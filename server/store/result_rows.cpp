@@ -67,7 +67,7 @@ void append(std::string& text, double value) {
   text.append(digits.data(), end);
 }
 
-/// Writes the list as a JSON array that contains one array of numbers per element.
+/// Writes `list` as a JSON array that contains one array of numbers per element of the list.
 template <class List, class Numbers>
 void write_json(std::string& text, const List& list, const Numbers& numbers_of) {
   text = "[";

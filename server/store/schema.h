@@ -17,8 +17,8 @@ void create_views(sqlite3* database);
 /// Returns the tables of this schema that are missing or have other columns. Throws StorageError.
 std::vector<std::string> differing_tables(sqlite3* database);
 
-/// An SQL expression for the highest study number that was ever used; 0: none. It counts rows of
-/// studies that were deleted by hand.
+/// An SQL expression for the highest study number that was ever used, or 0. It also considers rows
+/// of `results` whose study was deleted by hand.
 inline constexpr const char* kLastStudyId =
     "max((SELECT coalesce(max(seq), 0) FROM main.sqlite_sequence),"
     " (SELECT coalesce(max(study_id), 0) FROM main.results))";

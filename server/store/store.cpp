@@ -47,7 +47,7 @@ Store::Store(const std::string& path)
   }
   prepare_schema(path);
   if (kind == DatabaseKind::kEmpty) {
-    log_->merge();  // a new file then contains the whole database
+    log_->merge();  // empties the log, so that the new file contains the whole database
   }
   in_transaction(true, [this] {
     count_completed_points(database_.get());
@@ -131,7 +131,7 @@ void Store::commit(std::span<const Change> changes) {
     ranges_->forget();
     throw;
   }
-  // Throws if the path belongs to another file, because the transaction is then lost.
+  // Throws if another file is now at the path, because the transaction is then lost.
   file_.check();
   guard_syncs([this] { log_->shorten(); });
 }
@@ -291,7 +291,7 @@ void Store::add(const AddResults& change) {
   for (const protocol::PointResult& result : change.results) {
     const protocol::Point inputs = protocol::inputs_of(result, *change.table);
     statements_->add_result.run(change, result, inputs, stored_model(change, inputs.model));
-    ranges_->add(change.study_id, result.point());  // also if the point already had a row
+    ranges_->add(change.study_id, result.point());  // even if the point already had a row
   }
   if (const IntervalSet left_out = ranges_->open_points(change.study_id, change.left_out);
       !left_out.empty()) {

@@ -31,7 +31,7 @@ struct StoredStudy {
   IntervalSet failures;        ///< completed points that failed
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
   bool reuses = false;         ///< true if the lookup of other studies' results has not ended
-  std::uint64_t left_out = 0;  ///< number of completed points that `where` leaves out
+  std::uint64_t left_out = 0;  ///< number of completed points that the study's filter leaves out
   std::map<std::string, std::uint64_t> reused{};  ///< number of reused results by source study
 };
 
@@ -72,7 +72,7 @@ class Store final : public Storage {
   /// Returns a sentence about each study that `studies` skipped because this version refuses it.
   const std::vector<std::string>& skipped() const { return skipped_; }
 
-  /// Return the highest number of a study or worker ever used; 0: none. Throw StorageError.
+  /// Return the highest study or worker number ever used; 0 if none was. Throw StorageError.
   std::uint64_t last_study_id();
   std::uint64_t last_worker_id();
 

@@ -116,7 +116,7 @@ std::vector<StoredStudy> Store::studies() {
       continue;
     }
     if (!is_open || study.state != StudyState::kRunning) {
-      study.table.release();  // the table is made again when the study runs
+      study.table.release();  // the table of points is made again when the study runs
     }
     found.push_back(std::move(study));
   }

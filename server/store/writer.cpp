@@ -200,7 +200,7 @@ bool GroupCommit::clear(std::size_t most, std::vector<WriteReport>& reports) {
   } catch (const StorageGone& error) {
     note_gone(error, reports);
   } catch (const std::exception&) {
-    // The next commit reports faults such as a full disk. The next step tries again.
+    // The next commit reports faults such as a full disk. The next call of `clear` tries again.
   }
   return false;
 }
@@ -285,8 +285,8 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
   };
   for (WriteJob& job : jobs) {
     // Changes of one study must keep their order: "done, then retried" must not become "retried,
-    // then done". So when a job must wait, all later jobs without a waiting client wait too. Later
-    // jobs for its study with a waiting client are refused.
+    // then done". So when a job must wait, all later jobs for which no client waits must wait too.
+    // A later job for which a client waits is refused if it changes a study with a waiting job.
     if (gone_ || (!fault.empty() && !job.answer_failure)) {
       keep(job);
       continue;

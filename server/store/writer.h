@@ -87,12 +87,12 @@ class GroupCommit {
 
   /// Returns the number of results that are durable so far.
   std::uint64_t rows() const { return rows_; }
-  /// Returns whether the database refused jobs of the last write, which now wait.
+  /// Returns whether jobs wait because the database refused them in the last `write`.
   bool is_faulty() const { return faulty_; }
-  /// Returns whether nothing more is written, because WriteReport::Kind::kGone was reported.
+  /// Returns whether WriteReport::Kind::kGone was reported. Nothing more is written after that.
   bool is_gone() const { return gone_; }
 
-  /// Must be called at a start, because an earlier process may have left rows of deleted studies.
+  /// Must be called at a start, to continue the deletion of rows of deleted studies.
   void resume_deletions() { clears_ = true; }
   /// Returns whether rows of deleted studies may be left.
   bool has_to_clear() const { return clears_ && !gone_; }
@@ -132,7 +132,7 @@ class Writer {
   using Report = std::function<void(std::vector<WriteReport>)>;
 
   /// `report` is called on the writer's thread after each commit. `storage` must outlive this
-  /// object. `finish` interrupts a step that takes longer than `longest_last_step`.
+  /// object. `finish` interrupts a write, deletion or merge after `longest_last_step`.
   Writer(Storage& storage, Report report,
          std::chrono::milliseconds longest_last_step = std::chrono::seconds(5));
   /// Ends the thread. Does not wait for jobs that keep failing.

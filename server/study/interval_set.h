@@ -41,7 +41,7 @@ class IntervalSet {
     }
   }
 
-  /// Removes [begin, end). Parts of it may be missing in the set.
+  /// Removes [begin, end). The set need not contain all of it.
   void erase(std::uint64_t begin, std::uint64_t end);
   void erase(std::uint64_t point) { erase(point, point + 1); }
 

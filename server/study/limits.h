@@ -20,8 +20,8 @@ inline constexpr std::size_t kWaitingOutBytes = 64 * kMiB;
 inline constexpr std::size_t kUnstoredBytes = 64 * kMiB;
 /// Maximum number of running queries. Each uses a process and up to 256 MiB.
 inline constexpr std::size_t kRunningQueries = 4;
-/// Maximum number of points of all open studies. Above it sums could overflow. Memory depends on
-/// the number of intervals, not of points.
+/// Maximum number of points of all open studies; with more, sums of points could overflow. The
+/// memory for a set of points depends on its number of intervals, not of points.
 inline constexpr std::uint64_t kOpenPoints = 10'000'000'000'000;
 /// Maximum number of batches that a worker may request at a time. If one worker held more, other
 /// workers might have none.
@@ -29,13 +29,13 @@ inline constexpr std::uint32_t kCredit = 1024;
 
 // ---- Connections ------------------------------------------------------------------------------
 
-/// Maximum total size of messages from peers that are incomplete or not taken yet.
+/// Maximum total size of received messages that are incomplete or that the server has not taken.
 inline constexpr std::size_t kHeldInBytes = 512 * kMiB;
-/// Maximum size of incomplete and waiting messages at one port. Above it the peers of the port are
-/// not read.
+/// Maximum total size of incomplete and untaken messages at one port. Above it the server reads
+/// from no peer of the port.
 inline constexpr std::size_t kHeldInToPauseBytes = 64 * kMiB;
-/// A peer with more unsent output than this is busy: it gets no batch, and its requests are not
-/// read.
+/// A peer is busy if more output than this waits to be sent to it. A busy peer gets no batch, and
+/// its requests are not read.
 inline constexpr std::size_t kBusyBytes = 4 * kMiB;
 inline constexpr std::size_t kAllWaitingOutBytes = 512 * kMiB;
 /// Maximum number of simultaneous handshakes. One source address may have half of them, so that it
@@ -55,7 +55,7 @@ inline constexpr std::size_t kDeferredRequests = 1000;
 
 // ---- Requests of clients ----------------------------------------------------------------------
 
-/// A longer request is parsed on the check thread, because that takes more than a millisecond.
+/// A longer request is parsed on the check thread, because parsing takes more than a millisecond.
 inline constexpr std::size_t kLongestInlineRequest = std::size_t{64} << 10U;
 /// Maximum number and total size of long requests that wait for the check thread.
 inline constexpr std::size_t kWaitingChecks = 64;
@@ -85,7 +85,7 @@ inline constexpr std::size_t kWaitingQueryBytes = 16 * kMiB;
 
 /// Maximum number of traces that workers solve at a time. Each may return a message of 16 MiB.
 inline constexpr std::size_t kRunningTraces = 2;
-/// Maximum number of waiting requests for traces, and of running checks of their points.
+/// Maximum number of waiting requests for traces, and of running checks of points to trace.
 inline constexpr std::size_t kWaitingTraces = 64;
 /// Maximum number of traces that the page requests or sends at a time. Further requests wait.
 inline constexpr std::size_t kTracesOfPage = 4;

@@ -64,7 +64,7 @@ class Web {
   static bool is_client(const std::string& identity) {
     return identity == ServiceClient::kIdentity;
   }
-  /// Becomes readable when the page has requests.
+  /// Returns a descriptor that becomes readable when the page has requests.
   int descriptor() const { return service_.descriptor(); }
   std::vector<std::string> take_requests() { return service_.take(); }
   /// Passes an encoded reply to the page. Always returns true.
@@ -84,8 +84,8 @@ class Web {
   HttpServer http_;  // declared last, because its thread uses the other members
 };
 
-/// Health: 200 if the latest snapshot is recent, which shows that the loop runs. Before the first
-/// snapshot the time of the start counts.
+/// Health: 200 if the latest snapshot is recent, which shows that the loop runs. `made_ms` is the
+/// time of the snapshot, or of the start if there is no snapshot yet.
 HttpAnswer health(std::int64_t made_ms, std::int64_t now_ms);
 
 /// Readiness: 200 unless the server is stopping, the database accepts no results, or its disk is

@@ -42,8 +42,8 @@ def segments(found):
         inner = [i for i, vertex in enumerate(curve) if curves_of[vertex] == 1]
         if not inner:  # both its vertices belong to other borders too
             continue
-        # Each vertex has a bracket along x or y, with the regions `from` and `to` at its ends. A
-        # positive turn means that the end with `to` is on the left side of the curve.
+        # Each vertex is inside a bracket along x or y, whose ends are in the regions `from` and
+        # `to`. If the turn is positive, the end in `to` is on the left side of the curve.
         turns = []
         for i in inner:
             direction = at[curve[min(i + 1, len(curve) - 1)]] - at[curve[max(i - 1, 0)]]

@@ -170,7 +170,7 @@ struct Underway : Study {
 };
 
 /// Measures the time from killing a worker until another worker has solved all points that the
-/// killed worker held. These points have attempt 2.
+/// killed worker held. The results of these points have `attempt` = 2.
 void bench_worker_killed(std::uint64_t points) {
   Underway study(points);
   test::Worker survivor(study.folder, study.server.worker_url());

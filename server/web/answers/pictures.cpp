@@ -183,8 +183,8 @@ enum class Mark : std::uint8_t { kNotSolved, kFailed, kLeftOut, kNoValue, kFilte
 constexpr std::uint32_t kNan = 0x7fc00000;
 constexpr std::uint16_t kLastCode = 0xffff;
 
-/// Returns a JSON array with a number for each cell along a side: `first` plus the cell's offset in
-/// point numbers.
+/// Returns a JSON array with one number per cell along a side: `first` plus the difference between
+/// the point numbers of the cell and of the axis's first value.
 std::string offsets_json(const Side& side, std::uint64_t first) {
   std::vector<std::uint64_t> offsets;
   for (const std::uint64_t number : side.numbers) {
@@ -219,7 +219,7 @@ class SliceAnswer : public StudyAnswer {
   std::size_t next_point_ = 0;  // index in `points_` at which the search for the next row begins
   std::vector<Mark> marks_;     // marks of the cells, row by row
   std::vector<float> numbers_;  // values of the cells in a numeric column
-  // indices of the cells with each text of a category column
+  // indices of the cells of a category column, by text of the cell
   std::map<std::string, std::vector<std::size_t>> places_;
 };
 
@@ -350,8 +350,8 @@ std::vector<std::uint16_t> SliceAnswer::codes(ordered_json& head) const {
 // ---- Bins ---------------------------------------------------------------------------------------
 
 constexpr std::uint64_t kUsualBins = 64;
-/// Values within this relative distance outside an end count as inside, because users may type 0.2
-/// for 0.6 / 3.
+/// A value counts as inside the ends of an axis if it is outside by at most this relative distance,
+/// because users may type 0.2 for 0.6 / 3.
 constexpr double kEndTolerance = 1e-12;
 
 std::string sql_number(double value) {
@@ -487,7 +487,7 @@ protocol::StudyQuery BinsAnswer::ends_query() const {
   return query;
 }
 
-/// Returns a query that gives one row per bin. Points outside the ends are counted in the bin NULL.
+/// Returns a query that gives one row per bin. The bin NULL is for points outside the axes.
 protocol::StudyQuery BinsAnswer::counts_query() {
   std::size_t size = 1;
   std::string bin;

@@ -198,8 +198,8 @@ PendingAnswer request_flow(std::shared_ptr<ServiceExchange> exchange, const Clie
   };
 }
 
-/// Sends requests about a study until there is an answer. HTTP identifies a study by number, the
-/// service by name; `request` makes the request from the name.
+/// Sends requests about a study until there is an answer. HTTP requests contain the study's number,
+/// most requests to the service its name. `request` returns the request for a name.
 PendingAnswer named_study_flow(std::shared_ptr<ServiceExchange> exchange, std::uint64_t study,
                                std::function<ClientRequest(const std::string&)> request,
                                OnReply on_reply) {
@@ -321,7 +321,7 @@ PendingAnswer solve_trace(ServiceClient& service, std::uint64_t study, std::uint
     return FieldReader(fields).text(name).value_or("") == "1";
   };
   const bool with_shape = is_set("shape");
-  ClientRequest request;  // without `every` the trace has as many instants as fit
+  ClientRequest request;  // without `every`, the trace has as many instants as fit
   request.mutable_trace()->set_point(point);
   request.mutable_trace()->set_shape(with_shape);
   request.mutable_trace()->set_fall(is_set("fall"));

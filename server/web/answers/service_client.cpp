@@ -54,7 +54,7 @@ void ServiceClient::decode_frames() {
     }
     const auto awaited = awaited_.find(reply.request_id());
     if (awaited == awaited_.end()) {
-      continue;  // the client dropped the request, or the reply is a StillWorking
+      continue;  // not needed: a reply to a dropped request, or a StillWorking
     }
     const bool is_part = reply.has_query() && !reply.query().ends();
     awaited->second.may_end = awaited->second.may_end && is_part;
@@ -79,7 +79,7 @@ void ServiceClient::send(protocol::ClientRequest request) {
 }
 
 std::vector<std::string> ServiceClient::take() {
-  constexpr std::size_t kMaxATurn = 8;  // small, so that the loop is not blocked for long
+  constexpr std::size_t kMaxATurn = 8;  // few requests, so that the loop is not blocked for long
   woken_.clear();
   const std::lock_guard lock(mutex_);
   std::vector<std::string> some;

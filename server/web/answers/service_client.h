@@ -68,8 +68,7 @@ class ServiceClient {
   Slots& recipe_slots() { return recipe_slots_; }
   Slots& trace_slots() { return trace_slots_; }
 
-  // ---- Called by the loop's thread.
-  // Becomes readable when there are requests to take.
+  // Returns a descriptor that becomes readable when there are requests to take.
   int descriptor() const { return woken_.descriptor(); }
   /// Takes some of the waiting requests, encoded as ClientRequest.
   std::vector<std::string> take();
@@ -129,7 +128,7 @@ class ServiceExchange {
   std::uint64_t chunks_ = 0;
 };
 
-/// Returns the HTTP answer for an error of the service, without the name of an unknown study.
+/// Returns the HTTP answer for an error of the service. It omits the name of an unknown study.
 HttpAnswer failure(const protocol::ErrorReply& error);
 
 }  // namespace oblique::server

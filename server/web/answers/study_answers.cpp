@@ -31,8 +31,7 @@ using nlohmann::ordered_json;
 using protocol::ClientReply;
 using protocol::ClientRequest;
 
-/// Maximum length of a list of values. Longer lists are omitted; slices contain the values they
-/// show.
+/// Maximum length of a list of values; a longer list is omitted.
 constexpr std::uint64_t kMaxListed = 4096;
 
 ordered_json axis_json(const protocol::AxisLayout& layout) {
@@ -166,8 +165,8 @@ protocol::ModelParameters model_of(const nlohmann::json& written) {
   return protocol::to_message(model.model());
 }
 
-/// Returns the largest drop [m] that every tip of the study is sure to reach; nothing if no H is
-/// larger. For a larger H only a computed fall shows whether the tip reaches it.
+/// Returns the largest drop [m] that every tip of the study surely reaches; nothing if no H of the
+/// study exceeds this drop. For a larger H a computed fall is needed.
 std::optional<double> surely_reached_m(const protocol::Recipe& recipe) {
   const auto model = protocol::from_message(recipe.model());
   std::optional<double> least_m;
@@ -302,7 +301,7 @@ class Flow {
   ServiceExchange exchange_;
   ServedStudy study_;
   std::uint64_t points_ = 0;          // number of points in the study
-  std::shared_ptr<const void> slot_;  // permission to request the recipe
+  std::shared_ptr<const void> slot_;  // slot that allows requesting the recipe
   bool waits_for_slot_ = false;
   std::unique_ptr<StudyAnswer> answer_;
   const FlowClock::time_point deadline_;

@@ -22,9 +22,8 @@ namespace oblique::server {
 
 /// A study, as reported by the service.
 struct ServedStudy {
-  /// Returns whether the filter leaves out a point that has no row. If the study is done, returns
-  /// true: a worker has decided so, and its values may differ in the last digit from those computed
-  /// here.
+  /// Returns whether the filter leaves out a point that has no row. In a done study it does: a
+  /// worker has evaluated the filter, perhaps with values that differ from ours in the last digit.
   bool leaves_out(std::uint64_t point) const {
     return table->has_filter() && (state == "done" || !table->passes_filter(point));
   }
@@ -44,7 +43,7 @@ class StudyAnswer {
   StudyAnswer(const StudyAnswer&) = delete;
   StudyAnswer& operator=(const StudyAnswer&) = delete;
 
-  /// Returns the next query, in which the caller sets the study, or the answer. Called at the
+  /// Returns the answer, or the next query; the caller sets the study in the query. Called at the
   /// beginning and after the last row of each query.
   using Next = std::variant<protocol::StudyQuery, HttpAnswer>;
   virtual Next next(const ServedStudy& study) = 0;

@@ -21,7 +21,7 @@ namespace oblique::server {
 struct HttpRequest {
   std::string method;
   std::string path;  ///< without the query string
-  /// decoded fields of the query string; if names are equal, the first field
+  /// decoded fields of the query string; of several fields with one name, the first
   std::map<std::string, std::string> fields;
   std::multimap<std::string, std::string> headers;  ///< header names in lower case
   std::string body;
@@ -34,8 +34,8 @@ struct HttpRequest {
 };
 
 /// Returns the next bytes of an answer: empty if there are none yet, nothing at the end. Called on
-/// the HTTP thread and again after each wake; destroyed when the connection ends. An exception ends
-/// the connection.
+/// the HTTP thread and again after each HttpServer::wake; destroyed when the connection ends. An
+/// exception ends the connection.
 using HttpStream = std::function<std::optional<std::string>()>;
 
 struct HttpAnswer {
@@ -45,11 +45,11 @@ struct HttpAnswer {
   /// headers in addition to those that every answer has
   std::vector<std::pair<std::string, std::string>> headers = {};
   HttpStream stream = {};                       ///< if set, replaces the body
-  std::shared_ptr<const void> until_sent = {};  ///< destroyed when the body has been sent
+  std::shared_ptr<const void> until_sent = {};  ///< kept until the body has been sent
 };
 
-/// Returns the answer when it is ready. Called on the HTTP thread and again after each wake;
-/// destroyed when it has returned the answer or the client has disconnected.
+/// Returns the answer when it is ready. Called on the HTTP thread and again after each
+/// HttpServer::wake; destroyed when it has returned the answer or the client has disconnected.
 using PendingAnswer = std::function<std::optional<HttpAnswer>()>;
 
 using HttpOutcome = std::variant<HttpAnswer, PendingAnswer>;

@@ -101,7 +101,7 @@ struct HttpServer::Stream {
   MHD_Connection* const connection;
   HttpStream next;
   std::string unsent = {};
-  std::size_t sent = 0;  ///< number of sent bytes at the beginning of `unsent`
+  std::size_t sent = 0;  ///< number of first bytes of `unsent` that were sent
 };
 
 HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLimits& limits,
@@ -148,20 +148,20 @@ void HttpServer::wake() {
   }
   for (const auto& [connection, transfer] : transfers_) {
     if (transfer.due <= now) {
-      ::shutdown(transfer.socket, SHUT_RDWR);  // libmicrohttpd then closes the connection
+      ::shutdown(transfer.socket, SHUT_RDWR);  // makes libmicrohttpd close the connection
     }
   }
 }
 
-/// Starts or ends the time limit of a connection. libmicrohttpd restarts its own idle time at each
-/// byte, so a slow peer could stay for ever.
+/// Starts or ends the time limit of a connection. The idle time of libmicrohttpd begins again at
+/// each byte, so a slow peer could stay for ever.
 void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*context*/,
                                MHD_ConnectionNotificationCode what) {
   auto& server = *static_cast<HttpServer*>(self);
   const Time due = server.due_for(0);
   const std::lock_guard lock(server.mutex_);
   if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
-    server.transfers_.erase(connection);  // at this moment its socket is still open
+    server.transfers_.erase(connection);  // libmicrohttpd has not closed the socket yet
     return;
   }
   const int socket =
@@ -203,7 +203,7 @@ MHD_Result HttpServer::on_request(void* self, MHD_Connection* connection, const 
   auto& server = *static_cast<HttpServer*>(self);
   try {
     if (*exchange == nullptr) {
-      auto* const begun = new Exchange;  // the callback for completed requests deletes it
+      auto* const begun = new Exchange;  // deleted by the callback for completed requests
       *exchange = begun;
       begun->request.method = method;
       begun->request.path = path;
@@ -236,13 +236,13 @@ MHD_Result HttpServer::begin(MHD_Connection* connection, Exchange& exchange) {
     return send(connection, exchange, *std::move(refusal));
   }
   const std::string length = request.header("content-length");
-  // `refuse` has checked the header
+  // `refuse` has checked that the header is a number
   set_due(connection, due_for(length.empty() ? 0 : std::stoul(length)));
   return MHD_YES;
 }
 
 MHD_Result HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
-  const std::uint64_t wakes = wakes_;  // read before the poll, so that no wake is lost
+  const std::uint64_t wakes = wakes_;  // read before the answer is polled, to miss no wake
   if (is_stopping_ || (exchange.pending && is_gone(connection))) {
     return MHD_NO;
   }
@@ -289,7 +289,7 @@ MHD_Result HttpServer::send(MHD_Connection* connection, Exchange& exchange, Http
   return queued;
 }
 
-/// Moves the body or the stream out of the answer. Returns null if no memory is left.
+/// Returns a response that owns the body or the stream of `answer`; null if no memory is left.
 MHD_Response* HttpServer::response_of(MHD_Connection* connection, HttpAnswer& answer) {
   if (answer.stream) {
     constexpr std::size_t kBlock = 4096;
@@ -317,7 +317,7 @@ ssize_t HttpServer::on_stream(void* context, std::uint64_t /*position*/, char* i
                               std::size_t most) {
   Stream& stream = *static_cast<Stream*>(context);
   HttpServer& server = stream.server;
-  const std::uint64_t wakes = server.wakes_;  // read before the stream, so that no wake is lost
+  const std::uint64_t wakes = server.wakes_;  // read before `next` is called, to miss no wake
   if (server.is_stopping_ || is_gone(stream.connection)) {
     return MHD_CONTENT_READER_END_WITH_ERROR;
   }

@@ -30,8 +30,8 @@ bool all_are(const std::vector<std::string>& values, const std::set<std::string>
                      [&](const std::string& value) { return allowed.contains(value); });
 }
 
-/// Returns whether the request follows a link on a page of another site. The request must have no
-/// fields; otherwise a foreign link could log in the browser with a token.
+/// Returns whether the request follows a link on a page of another site. The link must have no
+/// fields; otherwise it could contain a token and log in the browser.
 bool is_followed_link(const HttpRequest& request) {
   return request.path == "/" && request.fields.empty() && request.method == "GET" &&
          request.all("origin").empty() &&

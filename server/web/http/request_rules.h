@@ -35,10 +35,9 @@ struct OwnNames {
 
 inline constexpr std::uint64_t kMaxBodyBytes = std::uint64_t{256} * 1024;
 
-/// Returns the answer that refuses a request; nothing if the request is allowed. A POST must come
-/// from a page of this server, according to its `Origin`; programs use the clients' port instead.
-/// Requests from pages of other sites are refused, except a followed link to the page without any
-/// field.
+/// Returns the answer that refuses a request; nothing if the request is allowed. Refuses a POST
+/// unless its `Origin` is this server; programs use the port for clients instead. Refuses requests
+/// from pages of other sites, except a link to the page without fields.
 std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own);
 
 }  // namespace oblique::server

@@ -227,7 +227,7 @@ void EventFeed::refresh() {
   std::string overview = overview_json(*latest);
   if (overview != overview_) {
     overview_ = std::move(overview);
-    // a restarted server uses the same clock, so it never repeats an ID
+    // the clock keeps running while a server restarts, so no ID is repeated
     id_ = std::to_string(latest->made_ms);
   }
 }

@@ -23,7 +23,7 @@ constexpr double kWantedWithin_s = 60.0;
 void count_studies(const Service& service, std::int64_t now_ms, Snapshot& snapshot) {
   const StudyStates& states = service.states();
   snapshot.studies_by_state = states.counts();
-  std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by falling priority, then by age
+  std::vector<std::pair<std::int64_t, StudyId>> ranked;  // by descending priority, the oldest first
   ranked.reserve(states.unfinished().size());
   for (const StudyId id : states.unfinished()) {
     if (!service.scheduler().has_study(id)) {

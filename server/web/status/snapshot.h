@@ -32,11 +32,11 @@ struct Snapshot {
   std::uint64_t points_open = 0;    ///< number of open points in running studies
   std::uint64_t points_leased = 0;
   double points_per_s = 0.0;
-  double thread_s_per_point = 0.0;  ///< average over the last batches; 0: unknown
+  double thread_s_per_point = 0.0;  ///< average of the last batches; 0 if unknown
   std::array<std::uint64_t, kStudyStates> studies_by_state{};
-  /// The first kShownStudies running and paused studies, by descending priority and then by age.
+  /// The first kShownStudies running and paused studies: highest priority first, then oldest.
   std::vector<protocol::StudyStatus> studies;
-  std::uint64_t unlisted = 0;                   ///< running and paused studies that are not listed
+  std::uint64_t unlisted = 0;                   ///< number of running and paused studies not shown
   std::vector<protocol::WorkerStatus> workers;  ///< the first kShownWorkers workers
   WorkerGroups groups{};                        ///< number of workers in each state
 

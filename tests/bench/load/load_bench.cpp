@@ -67,7 +67,7 @@ void check(const test::Outcome& ran) {
   }
 }
 
-/// Folder for the server of one table row. Also contains the server's keys, if keys are used.
+/// Folder of a server, which is measured for one row of the table, and of its keys, if any.
 struct Place {
   explicit Place(bool with_keys) {
     if (with_keys) {

@@ -95,7 +95,7 @@ class LoadGenerator::Parts {
     worker::Conversation conversation;
     std::optional<zmq::socket_t> socket;
     std::deque<Job> jobs;
-    double solving_since_s = 0.0;  // start of solving the unreported points of the first job
+    double solving_since_s = 0.0;  // when the first job's first unreported point began
   };
 
   void run() {

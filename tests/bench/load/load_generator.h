@@ -23,7 +23,7 @@ struct LoadCounts {
   std::uint64_t batches = 0;
   std::uint64_t results = 0;   ///< produced
   std::uint64_t messages = 0;  ///< sent
-  std::uint64_t connects = 0;  ///< connections, more than workers if some reconnected
+  std::uint64_t connects = 0;  ///< connections, including those of workers that reconnected
   std::uint64_t welcomed = 0;
   /// Longest delay of the generator's thread. If it exceeds 2 s, workers consider the server
   /// silent.

@@ -119,7 +119,7 @@ TEST(Answers, AnAnswerThatStopsArrivingGivesExitCodeOne) {
   const ScriptedServer server(
       gives([](std::uint64_t, std::uint64_t) { return std::vector<std::string>(); }));
   test::Outcome csv;
-  do {  // repeats the query if the first rows came after the timeout
+  do {  // runs the query again if even its first rows came after the timeout
     csv = run_client(server, {"query", "s", "--format", "csv", "--timeout", "0.2"});
   } while (csv.err.find("no answer from") != std::string::npos);
   EXPECT_EQ(csv.exit_code, 1);

@@ -78,7 +78,7 @@ TEST(Unknown, RunsThroughItsRangeWithTheAngleAndStaysWithin) {
     }
   }
   EXPECT_DOUBLE_EQ((Unknown{"k", 1e6, 1e8, 2e7}.value_at(1.5 * M_PI)), 1e7);
-  // The cosine has a rounding error of 2e-16. It is multiplied by 3, half of the range.
+  // The cosine has a rounding error of 2e-16. `value_at` multiplies it by 3, half of the range.
   EXPECT_NEAR((Unknown{"x", -2.0, 4.0, 0.0}.value_at(1.5 * M_PI)), 1.0, 1e-14);
 }
 
@@ -172,7 +172,7 @@ TEST(Fit, NamesUnknownsOfWhichOnlyTheProductIsDetermined) {
   EXPECT_FALSE(std::isnan(found.unknowns[2].sd));
   EXPECT_NEAR(found.unknowns[0].estimate.value * found.unknowns[1].estimate.value, 2.02, 0.05);
   // The product a b is about 2 and b is at most 10, so a is at least 0.2. The interval of a has no
-  // upper end below the bound of a.
+  // upper end, because it reaches the upper bound of a.
   EXPECT_NEAR(found.unknowns[0].estimate.from, 0.2, 0.02);
   EXPECT_TRUE(std::isnan(found.unknowns[0].estimate.to));
 }

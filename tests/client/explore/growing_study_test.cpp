@@ -74,7 +74,7 @@ TEST_F(GrowingStudyTest, AFailedPointHasNoValues) {
 
 TEST_F(GrowingStudyTest, ContinuesBetweenRoundsWithoutSolvingAPointTwice) {
   const auto first = open().solve(drops({1.0, 0.5}), "fn_peak_N", "round 1");
-  worker_.reset();  // stored rounds need no worker
+  worker_.reset();  // the results of round 1 are stored, so it needs no worker
   auto again = open();
   EXPECT_EQ(again.solve(drops({1.0, 0.5}), "fn_peak_N", "round 1").rows, first.rows);
   EXPECT_EQ(solved(), 2.0);

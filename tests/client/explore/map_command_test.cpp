@@ -1,4 +1,4 @@
-// `oblique map` as people run it.
+// Tests that run `oblique map`.
 #include <algorithm>
 #include <csignal>
 #include <filesystem>

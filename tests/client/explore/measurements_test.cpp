@@ -44,7 +44,7 @@ TEST(Measurements, AreNumbersWithDeviationsUnderTheConditionsOfTheirRow) {
   EXPECT_EQ(found.numbers[0].value, 5058.0);
   EXPECT_EQ(found.numbers[0].sd, 50.0);
   EXPECT_EQ(found.numbers[1].row, 1U);
-  EXPECT_DOUBLE_EQ(found.numbers[1].sd, 47.0);  // 1 %, because the field of its sd is empty
+  EXPECT_DOUBLE_EQ(found.numbers[1].sd, 47.0);  // 1 % of the value, because the sd field is empty
   EXPECT_EQ(found.numbers[2].output, 1U);
   EXPECT_DOUBLE_EQ(found.numbers[2].sd, 5e-6);
   EXPECT_EQ(found.numbers[2].name, "measured.csv:3: duration_s");

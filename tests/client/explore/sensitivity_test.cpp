@@ -151,8 +151,8 @@ TEST(SobolIndicesTest, IntervalsShrinkAsTheSquareRootOfTheRows) {
 }
 
 // Random rows satisfy the bootstrap's assumption, unlike Sobol's rows. So the intervals must miss
-// about 5 % of the indices: 120 of 400 designs x 6 indices. The limits of 50 and 260 are wide,
-// because the indices of a design depend on each other.
+// about 5 % of the 2400 indices of 400 designs: 120. The limits of 50 and 260 are wide, because the
+// indices of a design depend on each other.
 TEST(SobolIndicesTest, IntervalsCoverTheIndicesOfRandomRowsAsOftenAsTheySay) {
   const auto known = ishigami();
   int misses = 0;
@@ -239,7 +239,7 @@ TEST(MorrisTest, TheEffectsOfALinearFunctionAreItsCoefficients) {
     EXPECT_NEAR(effects.measures[2].of_inputs[i].value, slopes[i], 1e-12);
     EXPECT_NEAR(effects.measures[0].of_inputs[i].value, std::abs(slopes[i]), 1e-12);
     EXPECT_NEAR(effects.measures[0].of_inputs[i].half_width(), 0.0, 1e-12);
-    EXPECT_NEAR(effects.measures[1].of_inputs[i].value, 0.0, 1e-6);  // root of a rounding error
+    EXPECT_NEAR(effects.measures[1].of_inputs[i].value, 0.0, 1e-6);  // sqrt of a rounding error
   }
 }
 

@@ -92,7 +92,7 @@ TEST(QuantileTest, IntervalsCoverTheQuantileOfAnyDistribution) {
       std::sort(draws.begin(), draws.end());
       covered += covers(quantile_of(draws, p), p) ? 1 : 0;
     }
-    // Ranks are integers, so the intervals are rather too wide.
+    // Ends of intervals have integer ranks, so the intervals cover the quantile a little too often.
     EXPECT_GE(covered, kExpected - kSlack) << p;
     EXPECT_LE(covered, kExpected + kSlack) << p;
   }

@@ -64,7 +64,7 @@ TEST(PaperFigures, AreFigures3To7WithTheGroupsOfThePaper) {
 TEST(PaperFigures, MarkEveryPublishedNumberOfTheirGroups) {
   EXPECT_EQ(published_in(figures()[0]), 9U);   // three peaks at each of three e*
   EXPECT_EQ(published_in(figures()[1]), 60U);  // 30 peaks of F_n and 30 of F_t
-  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases: 6 in one panel, 6 in three each
+  EXPECT_EQ(published_in(figures()[2]), 24U);  // 12 ends of phases: 6 drawn once, 6 in three panels
   EXPECT_EQ(published_in(figures()[3]), 3U);   // ends of stick
   EXPECT_EQ(published_in(figures()[4]), 0U);   // nothing is published
 }

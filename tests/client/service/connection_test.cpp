@@ -193,7 +193,7 @@ TEST(Connection, ReportsAQueryThatTheServerHasNotFinishedInTime) {
       return std::vector{still_working(request, runs)};
     });
     std::string message;
-    do {  // repeats the query if the message came after the timeout
+    do {  // sends the query again if even StillWorking came after the timeout
       Connection connection(at(server.url(), 500));
       try {
         connection.query("SELECT 1");
