@@ -15,7 +15,7 @@ PROGRAMS = pathlib.Path(sys.argv.pop(1))
 DRIVER = {
     # Sets the variables and arguments that bash passes to a completion function.
     "bash": 'COMP_WORDS=("${@:2}"); COMP_CWORD=$(($# - 2)); "_$2" "$2" "$1" && printf "%s\\n" "${COMPREPLY[@]}"',
-    # These functions replace those of zsh. They print each offered word, with the prefix that compset removed in front of it.
+    # Replaces functions of zsh. Prints each offered word after the prefix that compset removed.
     "zsh": """compset() { local taken=${(M)PREFIX##${~2}}; [[ -z $taken ]] || { PREFIX=${PREFIX##${~2}}; BEFORE+=$taken; } }
 _describe() { local each; for each in ${(P)2}; do [[ ${each%%:*} != $PREFIX* ]] || print -r -- $BEFORE${each%%:*}; done }
 _files() { : }

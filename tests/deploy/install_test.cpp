@@ -40,8 +40,8 @@ bool is_there(const TemporaryFolder& folder, const std::string& program) {
   return run_tool(folder, "which", {program}).exit_code == 0;
 }
 
-/// Installs `component` (empty: all) for `prefix`, in the staging folder `destination` if one is
-/// given. Returns the outcome of cmake --install.
+/// Installs `component`, or all if it is empty, for `prefix`. `destination` is an optional staging
+/// folder. Returns the outcome of cmake --install.
 Outcome install(const TemporaryFolder& folder, const std::string& prefix,
                 const std::string& component = "", const std::string& destination = "") {
   std::vector<std::string> arguments{"--install", OBLIQUE_BUILD_FOLDER, "--prefix", prefix};
@@ -67,7 +67,7 @@ std::string text_of(const std::string& file) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Lists the files below `root` without manual pages, which exist only if the build had help2man.
+/// Lists the files below `root` except manual pages, which exist only if the build had help2man.
 std::vector<std::string> files_beside_pages(const std::string& root) {
   auto files = files_below(root);
   std::erase_if(files, [](const std::string& file) { return file.starts_with("usr/share/man/"); });
@@ -344,8 +344,8 @@ TEST(UnitsTest, SystemdFindsNoErrorsAndFewPermissions) {
     const auto verified = run_tool(folder, "systemd-analyze", {"verify", "--man=no", unit});
     EXPECT_EQ(verified.exit_code, 0) << unit;
     EXPECT_EQ(verified.err, "") << unit << ": systemd-analyze prints settings that it ignores";
-    // The threshold 13 is an exposure level of 1.3. The programs need access to network, local
-    // sockets and threads, which has the level 1.2.
+    // --threshold=13 allows an exposure level up to 1.3. The level is 1.2, because the programs
+    // need network, local sockets and threads.
     const auto judged =
         run_tool(folder, "systemd-analyze",
                  {"security", "--offline=true", "--threshold=13", "--no-pager", unit});

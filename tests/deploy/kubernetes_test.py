@@ -108,7 +108,7 @@ class Manifests(unittest.TestCase):
             mount = mounts[str(file.parent)]
             self.assertTrue(mount["readOnly"])
             secret = next(v for v in pod(workload)["volumes"] if v["name"] == mount["name"])["secret"]
-            # The group may read the key; the programs refuse keys that others may read.
+            # The group may read the key. The programs refuse a key that all users may read.
             self.assertEqual(secret["defaultMode"], 0o440)
             self.assertRegex(readme, f"create secret generic {secret['secretName']} .*--from-file=keys/{file.name}")
 

@@ -41,7 +41,7 @@ class Recipe(unittest.TestCase):
         for file in (TREE / "deploy/examples").iterdir():
             shutil.copy(file, self.folder)
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("OBLIQUE_")}
-        # PATH is as with installed packages. matplotlib stores its fonts in the test folder, not in the home folder.
+        # As if installed, the programs are in PATH. matplotlib stores its fonts in the test folder.
         self.environment |= {"PATH": f"{PROGRAMS}:/usr/bin:/bin", "PYTHONPATH": str(MODULE),
                              "MPLCONFIGDIR": str(self.folder / "fonts")}
 
@@ -131,7 +131,7 @@ class FiguresOfThePaper(Recipe):
         self.assertEqual(len(lines), 11)
         for line in lines[1:-1]:
             *_, fn_kN, published_fn_kN, ft_kN, published_ft_kN = map(float, line.split())
-            # Tolerance: half of the last printed digit, plus the rms difference of 0.56 % to the paper.
+            # The rms difference to the paper is 0.56 %; 0.005 is half of the last printed digit.
             self.assertAlmostEqual(fn_kN, published_fn_kN, delta=0.005 + 0.006 * published_fn_kN)
             self.assertAlmostEqual(ft_kN, published_ft_kN, delta=0.005 + 0.006 * published_ft_kN)
         for number in 4, 5, 6, 7:

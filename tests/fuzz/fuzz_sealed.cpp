@@ -15,9 +15,9 @@ void require(bool is_so) {
   }
 }
 
-/// Sends one MESSAGE. The first byte of the piece gives its flags, the other bytes are its body. If
+/// Sends one MESSAGE. The first byte of `piece` contains its flags, the other bytes its body. If
 /// the highest bit of the flags is set, the encrypted box is changed in transit. The port must
-/// accept only unchanged messages of one frame.
+/// accept only an unchanged MESSAGE without flags.
 void send_frame(Zmtp& zmtp, CurveClient& client, std::string_view piece) {
   constexpr unsigned kIsChanged = 0x80;
   constexpr std::size_t kMuch = std::size_t{1} << 20U;

@@ -45,7 +45,7 @@ TEST(FramesTest, ATruncatedFrameIsNotTheWholeMessage) {
       EXPECT_NE(received.kind_case(), WorkerMessage::kResults) << length << " bytes";
     }
   }
-  // All truncations are refused except the empty frame, which is a message without a kind.
+  // decode() refuses each truncated frame except the empty one, a message without a kind.
   EXPECT_EQ(refused, static_cast<int>(frame.size()) - 1);
 }
 

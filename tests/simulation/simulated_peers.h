@@ -28,7 +28,7 @@ inline std::uint64_t mark_of(double H) {
   return static_cast<std::uint64_t>((H - 1.0) / kMarkInH);
 }
 
-/// Returns the drop H of all points of a study. H encodes `mark`, the number of the study.
+/// Returns the drop H of all points of a study. H encodes `mark`, which identifies the study.
 inline double marked_H(std::uint64_t mark) {
   return 1.0 + static_cast<double>(mark) * kMarkInH;
 }
@@ -92,7 +92,7 @@ class SimulatedWorker {
  private:
   struct Work {
     worker::Batch batch;
-    std::uint64_t solved;  ///< number of solved positions
+    std::uint64_t solved;  ///< number of leading positions of `batch` that are solved or left out
   };
   void start() {
     protocol::WorkerHello hello;
@@ -351,7 +351,7 @@ class SimulatedClient {
   enum class Intent { kSubmit, kChange, kRename, kDelete };
 
   void connect() {
-    // No linger: a late request from the closed socket would undo later changes.
+    // Drops unsent messages of the old socket, because a late request would undo later changes.
     network_.close(link_, false);
     link_ = network_.open(peer_, [this](const std::string& frame) { answered(frame); });
   }
@@ -415,7 +415,7 @@ class SimulatedClient {
     } else {
       expect(protocol::STUDY_CHANGE_RESUME);
       request.mutable_submit()->set_name(name_);
-      // StoreModel contains only solved results, not copies from other studies.
+      // No reuse, because StoreModel does not model rows that are copied from other studies.
       request.mutable_submit()->set_no_reuse(true);
       if (world_.chance(0.3)) {
         // A submission with another priority changes the study's priority. The change is durable
@@ -539,8 +539,8 @@ class SimulatedClient {
   bool is_answered_ = false;         // the last request was answered
   // changes sent with the present request number; a repeated request may contain another change
   std::set<protocol::StudyChange> requested_;
-  /// States that the study may have, besides done: the last acknowledged state and the states
-  /// requested later. Without a value all states are possible.
+  /// States that the study may have: the last acknowledged state and the states requested later.
+  /// Done is always possible. Without a value all states are possible.
   std::optional<std::set<server::StudyState>> possible_;
 };
 

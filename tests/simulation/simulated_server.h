@@ -45,7 +45,7 @@ class SimulatedServer final : public server::Ports {
     on_started(found);
     server::ServiceSettings settings;
     settings.scheduler.loss_limits.failing_after = max_losses_;
-    // server/event_loop/event_loop.cpp sets the same value.
+    // server/event_loop/event_loop.cpp computes the first lease number in the same way.
     settings.scheduler.first_lease_id = found.starts << 40U;
     settings.solver_version = "1";
     settings.database_id = "disk";

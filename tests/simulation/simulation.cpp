@@ -24,8 +24,8 @@ class Simulation {
       : settings_(settings),
         world_(seed),
         disk_(world_),
-        // Except in storms, a point may lose many workers, because random crashes also hit sound
-        // points.
+        // Number of lost workers after which a point fails. It is high except in storms, because
+        // random crashes also hit workers with sound points.
         server_(world_, disk_, settings.storms ? 3 : 1000),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
@@ -289,7 +289,7 @@ class Simulation {
 
   void check_end() {
     if (!server_.runs()) {
-      throw Violation("no server runs at the end");  // a new server starts soon after each end
+      throw Violation("no server runs at the end");  // a server is restarted soon after it ends
     }
     for (const auto& client : clients_) {
       const auto* study = disk_.model().study(client->name());
@@ -344,7 +344,7 @@ class Simulation {
   std::vector<std::unique_ptr<SimulatedClient>> clients_;
   std::vector<std::unique_ptr<SimulatedWorker>> workers_;
   std::uint64_t vanishing_peers_ = 0;       // number of peers that disappear
-  std::uint64_t vanished_with_points_ = 0;  // number of these that had received a batch of a study
+  std::uint64_t vanished_with_points_ = 0;  // number of vanished peers with a batch of a study
   SimulationOutcome outcome_;
 };
 

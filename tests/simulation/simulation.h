@@ -17,7 +17,7 @@ struct SimulationSettings {
   bool storms = false;
 };
 
-/// Number of events by name in one or more runs. The numbers show that the faults happened.
+/// Number of occurrences of each event, by name, in one or more runs; shows that faults happened.
 using SimulationOutcome = std::map<std::string, std::uint64_t>;
 void add(SimulationOutcome& all, const SimulationOutcome& more);
 std::string text_of(const SimulationOutcome& outcome);
@@ -26,9 +26,9 @@ std::string text_of(const SimulationOutcome& outcome);
 /// determines all faults: crashes, broken connections, partitions, jumping clocks, full and failing
 /// disks, torn writes and power failures. Checks invariants after each event. Throws Violation (or
 /// std::logic_error from an invariant) if: an acknowledged result was not committed, a point was
-/// stored twice, a store lost more than a power failure may cause, an acknowledged study or change
-/// is missing, a study is not complete at the end, a row is wrong or missing, a database is
-/// damaged, or a lease leaks. Not thread-safe.
+/// stored twice, a store lost data that must survive a power failure, an acknowledged study or
+/// change is missing, a study is not complete at the end, a row is wrong or missing, a database is
+/// damaged, or a lease remains at the end. Not thread-safe.
 SimulationOutcome simulate(std::uint64_t seed, const SimulationSettings& settings);
 
 }  // namespace oblique::simulation

@@ -47,7 +47,7 @@ inline std::vector<MappedRange> mapped_ranges() {
   return ranges;
 }
 
-/// True unless a sanitizer forbids to read all memory of the process.
+/// True unless a sanitizer forbids reading all memory of the process.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 inline constexpr bool kAllMemoryMayBeRead = false;
 #elif defined(__has_feature)

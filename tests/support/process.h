@@ -29,7 +29,7 @@ using Environment = std::map<std::string, std::string>;
 
 /// Result of one run of a program.
 struct Outcome {
-  int exit_code;    ///< as Process::wait returns it
+  int exit_code;    ///< exit code or minus the signal, as Process::wait returns it
   std::string out;  ///< standard output
   std::string err;  ///< standard error
 };
@@ -52,7 +52,7 @@ class Process {
 
   pid_t pid() const { return pid_; }
   void send(int signal) const;
-  /// Returns what wait() returns, or nothing while the process runs.
+  /// Returns the result of wait() if the process has ended, else nothing.
   std::optional<int> exit_code();
   /// Waits until the process ends. Returns its exit code, or minus the signal that ended it: a
   /// program that handles SIGINT and exits returns 130; SIGINT without a handler gives −2.

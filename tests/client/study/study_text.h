@@ -18,7 +18,7 @@ inline std::string block_with(const std::string& line) {
   return text;
 }
 
-/// Parses the text of a study file. Uses an invented largest drop instead of solving falls.
+/// Parses a study file. Uses an invented largest drop of the tip instead of solving falls.
 inline Study parsed(const std::string& text, const std::string& file = "x.toml") {
   return parse_study(text, file, fake_reach());
 }

@@ -97,7 +97,7 @@ export class Browser {
     return page;
   }
 
-  /** Sets the window size of a tab, and the colour scheme and motion that the reader prefers. */
+  /** Sets the window size of a tab, and the reader's preferences for colour scheme and motion. */
   async look(page, { width = 1400, height = 900, scheme = "light", motion = "reduce" }) {
     await page.setViewport({ width, height });
     await page.emulateMediaFeatures([

@@ -5,7 +5,7 @@ import { join } from "node:path";
 import { test } from "node:test";
 import * as web from "./setup.mjs";
 
-/** Positions of the form's text fields. */
+/** Index of each text field in the form. */
 const fields = { name: 0, H: 1, mu: 2, e: 3, sample: 4, where: 5 };
 
 async function form(how = {}) {

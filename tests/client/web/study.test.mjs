@@ -216,8 +216,9 @@ test("all modules are preloaded, and no others", async () => {
     const path = (address) => new URL(address, location.href).pathname;
     const links = [...document.querySelectorAll("link[rel=modulepreload]")];
     const found = new Set(["/main.js"]);
+    // The loop also visits the modules that it adds to `found`.
     for (const module of found) {
-      const text = await (await fetch(module)).text(); // the outer loop also visits added modules
+      const text = await (await fetch(module)).text();
       for (const [, wanted] of text.matchAll(/ from "([^"]+)";$/gm)) {
         found.add(new URL(wanted, `${location.origin}${module}`).pathname);
       }

@@ -45,7 +45,7 @@ class ConfigurationTest : public testing::Test {
     variables_.push_back(name);
   }
 
-  /// Parses `words`. Stores error output in `errors_`, settings in `options_` and `printed_`.
+  /// Parses `words` into `options_`. Stores errors in `errors_` and printed settings in `printed_`.
   std::optional<int> parse(std::vector<std::string> words) {
     options_ = Options();
     CLI::App app("A program under test", "program");

@@ -136,7 +136,7 @@ TEST(StopSignals, AnIgnoredSighupStaysIgnored) {
 TEST(StopSignals, TheDestructorRestoresSignalsAndDropsPendingOnes) {
   {
     const StopSignals stop;
-    raise(SIGTERM);  // if it stayed pending, it would end this process below
+    raise(SIGTERM);  // if SIGTERM stayed pending, it would end the process after this block
   }
   sigset_t blocked;
   ASSERT_EQ(pthread_sigmask(SIG_BLOCK, nullptr, &blocked), 0);

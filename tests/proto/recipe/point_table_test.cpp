@@ -283,7 +283,7 @@ TEST(StudySize, EstimatesThePointsThatPassAFilterInALargeStudy) {
   EXPECT_EQ(counted.points, 1'001U);
 }
 
-// The tolerance of 400 is more than four standard deviations of the estimate.
+// The tolerance of 400 falls is more than four standard deviations of the estimated number.
 TEST(StudySize, EstimatesTheFallsOfALargeStudyFromTenThousandPoints) {
   const auto shared = size_of_blocks(
       {filtered({range("E", 6e10, 8e10, 5'000), kSomeH, range("mu", 0.1, 1, 40), kSomeE}, "")});

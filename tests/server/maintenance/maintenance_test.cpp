@@ -407,7 +407,7 @@ TEST_F(OfflineStudyTest, TheStoredRecipeCanBeReadWhileAServerWorks) {
 TEST_F(OfflineStudyTest, ATooLongRecipeIsNotParsed) {
   close();
   const std::string block =
-      study_.table->recipe().SerializeAsString();  // repeated, it is still a valid recipe
+      study_.table->recipe().SerializeAsString();  // copies in a row are also a valid recipe
   std::string bytes;
   while (bytes.size() <= protocol::kMaxFrameBytes) {
     bytes += block;

@@ -423,7 +423,7 @@ TEST_F(NetworkTest, AdmittedPeersAreServedBetweenTheHandshakesOfAFlood) {
   run_until([&] {
     while (const auto incoming = network_.next(keyed_, any_identity)) {
       bodies.push_back(incoming->body);
-      EXPECT_TRUE(network_.has_more());  // most handshakes of the flood still wait
+      EXPECT_TRUE(network_.has_more());  // most HELLO commands of the flood are not answered yet
     }
     return bodies.size() >= 2;
   });
@@ -506,7 +506,7 @@ TEST_F(ManyPeersOfOneAddressTest, ManyHandshakesOfOneAddressReplaceEachOtherAndN
   peers[0]->say_hello();
   take_welcome(*peers[0]);
   now_ms_ += NetworkLimits().handshake_ms / 10;
-  // This peer gets the place that became free when `second` was admitted.
+  // `silent` gets the place among the handshakes that became free when `second` was admitted.
   const auto silent = keyed_peers(1, kElsewhere);
   const auto third = admitted(kElsewhere);
   EXPECT_EQ(peers[0]->tcp.receive(), "") << "the peer replaced the oldest handshake";

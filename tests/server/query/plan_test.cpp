@@ -389,7 +389,7 @@ TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedNumbers) {
   }
   EXPECT_EQ(column("DISTINCT 0.1166477 * mu").name, "0.1166477 * mu");
   EXPECT_EQ(column("0.1166477 AS \"x y\"").name, "x y");
-  // If both numbers are equal, the condition selects exactly one row.
+  // If 0.1166477 and 1166477 / 1e7 are equal, the condition holds for exactly one row.
   const std::string is_it = "point = 3 AND 0.1166477 = 1166477 / 1e7";
   EXPECT_EQ(number(question("count(*)", "", is_it)), 9.0);
   EXPECT_EQ(number(question("point", "", "", is_it + " DESC")), 3.0);

@@ -1,4 +1,4 @@
-// Tests the ranges of points that conditions select. Compares whole plans with plain SQLite.
+// Tests the ranges of points that conditions select, and compares planned with plain queries.
 #include "server/query/plan.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ using protocol::range;
 using protocol::Recipe;
 using Ranges = std::vector<PointRange>;
 
-/// Returns a grid of ten values each of H from 0.1, mu from 0.2 and e from 0.1.
+/// Returns a grid with ten values per axis: H from 0.1 to 1, mu from 0.2 to 2, e from 0.1 to 1.
 Recipe cube() {
   return protocol::recipe_of(
       {{range("H", 0.1, 1.0, 10), range("mu", 0.2, 2.0, 10), range("e", 0.1, 1.0, 10)}});

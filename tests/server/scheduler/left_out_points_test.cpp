@@ -153,8 +153,7 @@ TEST_F(LeftOutPointsTest, PointsAddedByGrowthMayBeLeftOutToo) {
   EXPECT_EQ(bench_.scheduler.study(1).left_out, 58U);
 }
 
-/// Returns the size of the batch that a worker gets after it has solved `batches` others in 1 ms
-/// each.
+/// Returns the size of a worker's next batch after it has solved `batches` batches in 1 ms each.
 std::uint64_t batch_size_after(int batches, const std::string& where) {
   const auto table = filtered_table(1'000'000, where);
   SchedulerBench bench(table, trusting());

@@ -23,7 +23,7 @@ std::uint64_t fall_of(const PointTable& table, std::uint64_t point) {
   return solver::fall_hash(table.model(table.point(point).model));
 }
 
-/// Returns the hashes of the points' falls in this order. Equal neighbours are merged into one.
+/// Returns the hashes of the falls of all points in `order`. Equal neighbours are merged into one.
 std::vector<std::uint64_t> runs_of_falls(const PointTable& table, const PointOrder& order) {
   std::vector<std::uint64_t> falls;
   for (std::uint64_t place = 0; place < table.size(); ++place) {

@@ -354,7 +354,7 @@ TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
   EXPECT_EQ(supervised.failed.size(), 1U);
 }
 
-/// Provides workers that are proven, because each has solved a point, and further points.
+/// Provides proven workers (each has solved a point) and open points.
 class SuspectTest : public testing::Test {
  protected:
   /// Lets each of the workers 1 to `workers` solve one point of a study. `left` points of the study
@@ -432,7 +432,7 @@ TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherPointRisky) {
   for (WorkerId worker = 1; worker <= 5; ++worker) {
     bench_.feed(CreditGiven{worker, 2});
     bench_.feed(WorkerUnreachable{worker});
-    // The same process reconnects, so the scheduler does not separate the two points.
+    // The process returns, so neither point becomes suspect and the next worker gets both.
     bench_.join_as(name(worker), worker + 10, 0);
   }
   EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());

@@ -135,8 +135,8 @@ TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
   const SendBatch slow = bench.join(2, 1).at(0);
   bench.pass(10'000, {1, 2});
   bench.solve_and_store(quick, 10.0 * static_cast<double>(quick.count()));
-  // The quick worker needs 10 s for a point, which makes 80 s for eight points. The limit is ten
-  // times that time.
+  // The quick worker needs 10 s per point, so 80 s for the eight points that a thread solves
+  // together. A worker that stores nothing for ten times as long counts as stalled.
   bench.pass(780'000, {1, 2});
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, slow.count());
   bench.pass(20'000, {1, 2});

@@ -144,7 +144,7 @@ class WriteLedgerTest : public testing::Test {
  protected:
   static LedgerLimits small() { return {.bytes = 200, .writes = 24, .changes = 3}; }
 
-  /// Queues the results of a message of `bytes` bytes.
+  /// Queues results that arrived in a message of `bytes` bytes.
   void write_results(std::size_t bytes) {
     AddResults change{};
     change.message_bytes = bytes;

@@ -494,7 +494,7 @@ TEST_F(ServiceTraceTest, AnInvalidTraceFailsTheRequestAndNothingElse) {
                 trace.clear_states();
               }),
               HasSubstr("no rows"));
-  worker_sends_trace(trace_of({}, ""));  // ignored, because it was not ordered
+  worker_sends_trace(trace_of({}, ""));  // ignored, because the service did not order a trace
   request_trace(99, 60);
   worker_sends_trace(trace_of(orders().back(), "\2"));
   EXPECT_TRUE(last_reply().has_trace());

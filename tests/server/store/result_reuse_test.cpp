@@ -201,7 +201,7 @@ Inputs inputs_of(const protocol::PointTable& points, std::uint64_t number) {
 
 TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
   std::mt19937 random(4711);
-  std::map<Inputs, std::string> solved;  // first row with these inputs, written as in `reused_from`
+  std::map<Inputs, std::string> solved;  // first row with the inputs, as "study STUDY/POINT"
   std::size_t reused = 0;
   std::size_t open = 0;
   for (std::uint64_t study = 1; study <= 60; ++study) {
@@ -233,8 +233,8 @@ TEST_F(ResultReuseTest, RandomStudiesReuseTheResultsThatALookupInAMapFinds) {
     EXPECT_EQ(copies(study), expected) << "study " << study;
     EXPECT_EQ(outcome.points.size(), expected.size());
     reused += expected.size();
-    // Solves some of the points that are still open. `solved` does not get copied rows, because a
-    // row is always copied from its first source.
+    // Solves some of the open points and adds them to `solved`. Copied rows are not added, because
+    // their source, the first row with the same inputs, is in `solved` already.
     AddResults rest = results_of(added, {}, kWorker);
     const IntervalSet completed = store().studies().back().completed;
     for (std::uint64_t number = 0; number < points->size(); ++number) {

@@ -152,7 +152,7 @@ TEST(Snapshot, WantsThreadsForOpenPointsOnly) {
 
 struct Metrics {
   std::map<std::string, std::string> types;
-  std::map<std::string, double> values;  ///< the keys are printed names with labels
+  std::map<std::string, double> values;  ///< keys: names of metrics with their labels, as printed
 };
 
 Metrics parse(const std::string& text) {
@@ -276,7 +276,7 @@ TEST_F(WebTest, MetricsFollowTheServer) {
   EXPECT_THAT(get_started("/metrics"),
               testing::HasSubstr("Content-Type: text/plain; version=0.0.4; charset=utf-8"));
   const auto values = [this] { return parse(body_of(get_started("/metrics"))).values; };
-  auto now = values();  // the first values may be half a second old
+  auto now = values();  // the server updates these values twice a second
   while (now["oblique_points_solved_total"] < 20.0) {
     now = values();
   }

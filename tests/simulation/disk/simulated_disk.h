@@ -88,7 +88,7 @@ class StoreModel {
   /// commits since the last full sync may be missing. The contents found become the state of the
   /// model.
   void restarted(const Found& found, bool power_was_lost) {
-    // Without a power failure only changes that were refused after the last commit are uncertain.
+    // Without a power failure only failed commits after the last successful one are uncertain.
     const auto last_stored =
         std::find_if(entries_.rbegin(), entries_.rend(), [](const Entry& e) { return e.stored; });
     auto entry = power_was_lost ? entries_.begin() : last_stored.base();
@@ -126,7 +126,7 @@ class StoreModel {
       synced_ = now_;
       entries_.clear();
     } else if (came_back != entries_.end()) {
-      // The change counts as stored now. A later crash may bring back another refused change.
+      // The found change of a failed commit counts as the last stored change from now on.
       came_back->stored = true;
       std::rotate(came_back, came_back + 1, entries_.end());
     }
@@ -153,7 +153,7 @@ class StoreModel {
 
   std::uint64_t failed_commits = 0;
   std::uint64_t undone_commits = 0;  ///< commits that power failures undid
-  std::uint64_t refused_kept = 0;    ///< refused changes that a crash brought back
+  std::uint64_t refused_kept = 0;    ///< changes of failed commits, found after a crash
 
  private:
   struct Contents {
@@ -161,7 +161,7 @@ class StoreModel {
     std::map<std::uint64_t, Rows> rows;
     std::uint64_t last_study_id = 0;  ///< including deleted studies
     std::uint64_t last_worker_id = 0;
-    bool has_deleted = false;  ///< if true, rows of workers may be missing
+    bool has_deleted = false;  ///< a study was deleted; rows of table `workers` may be missing
 
     bool operator==(const Found& found) const {
       return last_study_id == found.last_study_id &&
@@ -281,7 +281,7 @@ inline const std::string& database_path() {
   return kPath;
 }
 
-/// Returns a database without studies, which is made once.
+/// Returns the contents of a database file without studies. Makes the file on the first call.
 inline const std::string& empty_database() {
   static const std::string kImage = [] {
     World world(0);
@@ -361,9 +361,9 @@ class SimulatedDisk final : public server::Storage {
     cleared_rows += store_->cleared_rows() - before;
     return cleared;
   }
-  std::uint64_t cleared_rows = 0;  ///< cleared rows of deleted studies
+  std::uint64_t cleared_rows = 0;  ///< number of rows removed because their study was deleted
 
-  /// Compares every row with the model and runs SQLite's checks. Throws Violation.
+  /// Compares every row with the model and runs SQLite's checks. Throws Violation on a difference.
   void check_rows() {
     using server::Statement;
     const auto database = server::open_database(files_.path(), SQLITE_OPEN_READONLY);
@@ -419,7 +419,7 @@ class SimulatedDisk final : public server::Storage {
   World& world_;
   SimulatedFiles files_;
   StoreModel model_;
-  bool power_was_lost_ = false;  // since the last open()
+  bool power_was_lost_ = false;  // the power has failed since the last open()
   int checkpoint_pages_;
   std::uint64_t starts_ = 0;
   std::unique_ptr<server::Store> store_;

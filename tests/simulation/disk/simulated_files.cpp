@@ -336,8 +336,8 @@ class SimulatedFile::Losses {
   }
 
   bool keeps_size(std::int64_t step) const { return step < kept_; }
-  /// Returns the end of the surviving part of a torn write that would have ended at `end`; 0 for
-  /// other steps.
+  /// If step `step` is the torn write, which would have ended at `end`, returns the end of the part
+  /// that survives; else 0.
   std::size_t torn_end(std::int64_t step, std::size_t end) const {
     return step == kept_ && !reordered_ ? std::min(end, torn_before_ * kSector) : 0;
   }
@@ -357,7 +357,7 @@ class SimulatedFile::Losses {
   std::int64_t steps_;
   bool reordered_;
   std::int64_t kept_;
-  std::size_t torn_before_ = 0;  // sectors of step kept_ before this sector survive
+  std::size_t torn_before_ = 0;  // first sector that the torn write `kept_` loses
   std::map<std::size_t, std::int64_t> kept_of_sector_;
 };
 

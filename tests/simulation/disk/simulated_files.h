@@ -37,7 +37,7 @@ class SimulatedFile {
 
  private:
   struct Step {
-    std::size_t offset;  // position of `bytes`, or the new file size
+    std::size_t offset;  // position of `bytes` in the file; the new file size if `truncates`
     std::string bytes;
     bool truncates;
   };
@@ -63,7 +63,7 @@ struct SharedMemory {
 /// file system. Only one thread of a process may use such files.
 class SimulatedFiles {
  public:
-  /// `image` is the initial, durable database. `world` also seeds SQLite's random numbers.
+  /// `image` is the initial, durable database. `world` draws faults and seeds SQLite's generator.
   SimulatedFiles(World& world, std::string path, const std::string& image);
   ~SimulatedFiles();
   SimulatedFiles(const SimulatedFiles&) = delete;
@@ -79,12 +79,12 @@ class SimulatedFiles {
   bool is_used() const { return used_; }
   /// Simulates a power failure: only the files and file names on the disk survive.
   void lose_power();
-  /// Lets the process die during the `operations`-th write, sync, truncation or deletion from now;
-  /// 0: never.
+  /// Lets the process die during the `operations`-th write, sync, truncation or deletion from now,
+  /// or never if `operations` is 0.
   void plan_death(std::int64_t operations) { death_in_ = operations; }
-  /// Lets the `syncs`-th sync from now fail and lose its data; 0: no sync.
+  /// Lets the `syncs`-th sync from now fail and lose its data, or no sync if `syncs` is 0.
   void plan_failing_sync(std::int64_t syncs) { failing_sync_in_ = syncs; }
-  /// Returns true until the planned sync has failed.
+  /// Returns true if a failing sync is planned and has not happened yet.
   bool awaits_failing_sync() const { return failing_sync_in_ > 0; }
   /// Returns true if a sync has failed since the process started.
   bool sync_failed() const { return sync_failed_; }

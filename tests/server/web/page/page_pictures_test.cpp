@@ -101,7 +101,7 @@ TEST_F(PageStudyTest, SolvedPointsAreFoundAmongManyOpenOnes) {
                      {{protocol::range("H", 0.1, 1.0, 40), protocol::range("mu", 0.0, 2.0, 40),
                        protocol::range("e", 0.5, 1.0, 40)}}));
   solve(200);
-  std::set<std::uint64_t> solved;  // more than 200, because batches are solved completely
+  std::set<std::uint64_t> solved;  // may be more than 200, because batches are solved completely
   const json stored = page_.json("/api/studies/1/rows?select=point&limit=64000");
   for (const json& row : stored["rows"]) {
     solved.insert(row[0].get<std::uint64_t>());

@@ -23,7 +23,7 @@ using protocol::ClientRequest;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-/// An answer that runs `queries` queries and then lists the points in their rows.
+/// An answer that runs `queries` queries and lists the points in the first column of all rows.
 class Points : public StudyAnswer {
  public:
   explicit Points(int queries = 1, const std::string& condition = {})
