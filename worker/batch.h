@@ -42,12 +42,12 @@ class Batch {
     std::uint64_t position;
     std::uint64_t point;
   };
-  /// The consecutive points that begin at `position`, at most up to the position `end`.
+  /// The range of consecutive points that begins at `position` and ends at or before `end`.
   Range points_from(std::uint64_t position, std::uint64_t end) const;
 
   std::uint64_t number_;
   std::uint64_t study_id_;
-  std::vector<Run> runs_;  ///< each run of consecutive points ends where the next begins
+  std::vector<Run> runs_;  ///< runs of consecutive points; each ends where the next begins
   std::uint64_t size_ = 0;
   std::shared_ptr<const protocol::PointTable> points_;
 };

@@ -56,10 +56,10 @@ class BatchSolver::Task : public solver::PointSource {
     }
   }
 
-  /// Moves the results to the solver. The caller must hold the lock.
+  /// Moves the results of this thread to the solver. The caller must hold the lock.
   void pass_on() {
     if (results_.empty() && left_out_.empty()) {
-      return;  // the next results include the time so far
+      return;  // the time so far is added to that of the next results
     }
     const Clock::time_point now = Clock::now();
     if (!open_.unwanted) {
@@ -98,8 +98,8 @@ class BatchSolver::Task : public solver::PointSource {
   BatchSolver& solver_;
   OpenBatch& open_;  ///< the batch is not removed while a thread works on it
   const Batch& batch_;
-  std::uint64_t next_ = 0;                       ///< position
-  std::uint64_t end_ = 0;                        ///< after the last position
+  std::uint64_t next_ = 0;                       ///< position of the next point
+  std::uint64_t end_ = 0;                        ///< position after the last point of this part
   std::vector<protocol::PointResult> results_;   ///< not yet moved to the solver
   std::vector<Batch::Range> left_out_;           ///< not yet moved to the solver
   Clock::time_point busy_since_ = Clock::now();  ///< start of the work on these results

@@ -28,8 +28,8 @@ class BatchSolver {
   using SolvePoints =
       std::function<void(const Batch&, solver::PointSource&, const solver::TakeOutcome&)>;
 
-  /// A solving thread calls `batch_ended` after the last point of a batch. It must not call this
-  /// object.
+  /// A solving thread calls `batch_ended` after the last point of a batch. `batch_ended` must not
+  /// call this object.
   BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads = 1);
 
   /// Waits for the points that are being solved.
@@ -59,7 +59,7 @@ class BatchSolver {
     std::uint64_t given = 0;            ///< number of positions that threads have taken
     std::size_t solvers = 0;            ///< number of threads that work on the batch
     std::atomic<bool> dropped = false;  ///< written under the lock, read without it
-    bool unwanted = false;              ///< the results are dropped with the batch
+    bool unwanted = false;              ///< true if the results are dropped with the batch
   };
   using OpenBatches = std::list<OpenBatch>;
   class Task;  ///< the points that one thread solves, part by part
@@ -74,8 +74,8 @@ class BatchSolver {
   const std::size_t thread_count_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  OpenBatches open_;                            ///< in the order of their numbers
-  std::map<std::uint64_t, Progress> progress_;  ///< by the batch's number
+  OpenBatches open_;                            ///< batches in the order of their numbers
+  std::map<std::uint64_t, Progress> progress_;  ///< key: number of the batch
   bool paused_ = false;
   std::vector<std::jthread> threads_;  ///< declared last: they use the other members
 };

@@ -300,8 +300,8 @@ void Conversation::on(const protocol::StudyDefinition& definition) {
     studies_[definition.study_id()] =
         std::make_shared<const protocol::PointTable>(definition.recipe());
   } catch (const solver::InputError& error) {
-    // The server accepted this recipe, so its release differs from this one. The worker stops,
-    // because otherwise these points would fail.
+    // The server accepted this recipe, so the server's release differs from the worker's. The
+    // worker stops, because otherwise the points of the study would fail.
     finish(1, fmt::format("study {} cannot be read: install the same release on server and "
                           "worker. {}",
                           definition.study_id(), error.what()));
@@ -536,7 +536,7 @@ void Conversation::finish(int exit_code, const std::string& reason) {
   effects_.emplace_back(Finish{exit_code, reason + lost});
 }
 
-/// Stops the worker at `stop_ms` or when idle; with exit code 1 if no server ever welcomed it.
+/// Stops the worker at `stop_ms` or when idle. The exit code is 1 if no server ever welcomed it.
 void Conversation::exit_if_due() {
   if (!held_.empty() || !outbox_.is_empty()) {
     last_work_ms_ = now_ms_;

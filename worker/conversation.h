@@ -22,7 +22,7 @@ namespace oblique::worker {
 
 /// Opens a new socket; closes the present one and drops its queued messages.
 struct Connect {
-  std::string reason;  ///< empty for the first connection
+  std::string reason;  ///< why the worker connects again; empty for the first connection
 };
 struct Send {
   protocol::WorkerMessage message;
@@ -61,7 +61,7 @@ using Effects = std::vector<Effect>;
 // ---- Results until they are acknowledged --------------------------------------------------------
 
 struct OutboxLimits {
-  /// Solving pauses while this many results, or bytes of them, are not acknowledged.
+  /// Solving pauses at this number of unacknowledged results, or at this number of their bytes.
   std::size_t unacknowledged_results = 50'000;
   std::size_t unacknowledged_bytes = std::size_t{64} << 20U;
   std::size_t messages_on_their_way = 128;  ///< more messages wait until some are acknowledged
@@ -102,7 +102,7 @@ class Outbox {
   std::deque<Message> messages_;
   std::size_t results_ = 0;
   std::size_t bytes_ = 0;
-  std::size_t on_their_way_ = 0;  ///< number of sent messages, which are the oldest
+  std::size_t on_their_way_ = 0;  ///< number of sent messages; they precede the unsent ones
   std::uint64_t next_sequence_ = 1;
 };
 
@@ -113,7 +113,7 @@ inline constexpr std::int64_t kNever_ms = std::numeric_limits<std::int64_t>::max
 
 /// When a worker stops by itself.
 struct ExitSettings {
-  std::int64_t stop_ms = kNever_ms;       ///< by the clock of `now_ms`
+  std::int64_t stop_ms = kNever_ms;       ///< time of the stop, by the clock of `now_ms`
   std::string until = {};                 ///< end of the process, as the user wrote it
   std::int64_t idle_exit_ms = kNever_ms;  ///< longest time without work
 };
@@ -129,7 +129,7 @@ struct Doubling {
 };
 
 struct ConversationSettings {
-  std::uint32_t batches_held = 2;  ///< one batch is being solved, one waits
+  std::uint32_t batches_held = 2;  ///< one batch is solved while another waits
   OutboxLimits outbox = {};
   std::size_t results_a_message = 1000;
   std::size_t bytes_a_message = std::size_t{64} << 10U;  ///< a larger result has its own message
@@ -156,7 +156,7 @@ class Conversation {
   Effects on_message(const protocol::ServerToWorker& message, std::int64_t now_ms);
   Effects on_progress(std::vector<Progress> progress, std::int64_t now_ms);
   Effects on_traces(std::vector<protocol::Trace> traces, std::int64_t now_ms);
-  /// To be called when a message could not be sent. The caller drops later messages of the effects.
+  /// To be called when a message could not be sent. The caller does not send later messages.
   Effects on_send_failed(std::int64_t now_ms);
   /// To be called when the server has rejected the socket. Only a person can remove the cause.
   Effects on_rejected(const std::string& reason, std::int64_t now_ms);
@@ -226,13 +226,13 @@ class Conversation {
   std::int64_t heartbeat_due_ms_ = 0;
   std::int64_t heartbeat_interval_ms_ = 1000;
   std::int64_t lost_after_ms_ = 3000;
-  std::int64_t backoff_ms_ = 0;   ///< next pause; 0 after a session that did some work
+  std::int64_t backoff_ms_ = 0;   ///< pause before the next attempt; 0 after a session with work
   std::int64_t rejected_ms_ = 0;  ///< last pause after a rejection; 0 after a welcome
   std::string rejection_;         ///< reason of the last rejection; empty after a welcome
   std::int64_t start_ms_ = 0;
   std::int64_t last_work_ms_ = 0;  ///< when the worker last had a batch, trace or result
   bool was_welcomed_ = false;      ///< at least once
-  bool has_warned_ = false;        ///< true if it has warned that no server answers
+  bool has_warned_ = false;        ///< true after the warning that no server answers
   bool stopping_ = false;
   std::string stop_reason_;
   int stop_exit_code_ = 0;
@@ -242,7 +242,7 @@ class Conversation {
   std::string database_id_;
 
   std::map<std::uint64_t, std::shared_ptr<const protocol::PointTable>> studies_;
-  std::map<std::uint64_t, Held> held_;  ///< by the batch's number
+  std::map<std::uint64_t, Held> held_;  ///< key: number of the batch
   std::uint64_t next_batch_ = 1;
   std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches belong to another database
   std::uint32_t open_credit_ = 0;              ///< batches requested and not received yet

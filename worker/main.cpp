@@ -47,7 +47,7 @@ struct Options {
   SessionSettings session;
   oblique::protocol::LogSettings log;
   std::string keys;
-  std::uint64_t fall_memory_bytes = 0;  ///< 0: an eighth of the free memory
+  std::uint64_t fall_memory_bytes = 0;  ///< 0 means an eighth of the free memory
   double idle_exit_s = 0.0;
   pid_t parent = 0;
 };
@@ -116,7 +116,7 @@ std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
 int run_worker(Options options) {
   SessionSettings& settings = options.session;
   oblique::protocol::Notifier notifier;
-  oblique::protocol::StopSignals stop;  // must exist before any thread starts
+  oblique::protocol::StopSignals stop;  // must be constructed before any thread starts
   oblique::protocol::survive_failed_writes();
   if (!oblique::protocol::stop_with_parent(options.parent)) {
     spdlog::warn("the parent process ended before this one started");

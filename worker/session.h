@@ -41,7 +41,7 @@ class Session {
   /// be recognised. Throws solver::InputError unless `settings.server` is an address.
   int run(int stop_descriptor, const std::function<void()>& on_stop);
 
-  /// Whether a point is being solved. The destructor waits for its end.
+  /// Whether a point is being solved. The destructor waits until such points end.
   bool is_solving() const { return solver_.is_solving() || tracer_.is_solving(); }
 
  private:
@@ -62,7 +62,7 @@ class Session {
   const SessionSettings settings_;
   zmq::context_t context_;
   std::optional<Link> link_;
-  unsigned attempt_ = 0;      ///< number of the connection; selects IPv4 or IPv6 in turn
+  unsigned attempt_ = 0;      ///< number of sockets without any message; selects IPv4 or IPv6
   bool has_received_ = true;  ///< whether this socket has received a message
   protocol::WakeUp news_;     ///< signalled when a batch ended or a trace is ready
   Conversation conversation_;

@@ -49,7 +49,7 @@ void expect_times(const Database& database, const KnownImpact& known, const std:
       database.numbers("SELECT 1e6 * (t1_s - t0_s)" + where(known, "phases") + " ORDER BY seq");
   ASSERT_EQ(phases_us.size(), known.phases_us.size()) << name;
   for (std::size_t i = 0; i < phases_us.size(); ++i) {
-    // A phase ends at an extremum of the force; the error of this instant scales with the duration.
+    // Phases end at extrema of the force. Errors of these times scale with the contact duration.
     EXPECT_NEAR(phases_us[i], known.phases_us[i], 0.0005 + kTimeTolerance * known.contact_us)
         << name << ": phase " << i;
   }

@@ -137,8 +137,8 @@ std::vector<Output> outputs() {
   };
 }
 
-/// Returns the largest difference of one output between two results, divided by the scale in
-/// `right`. Both results must have the same number of values.
+/// Returns the largest difference between `values` of an output and its values in `right`, divided
+/// by the output's scale in `right`. Both results must have the same number of values.
 double difference(const Output& output, const std::vector<double>& values,
                   const solver::CaseResult& right) {
   const Values expected = output.values(right);
@@ -242,9 +242,9 @@ std::vector<std::vector<double>> extrapolated(const CaseResult& whole, const Cas
   return values;
 }
 
-// Vibrations of w = 1.5e5 rad/s make up about a tenth of the speed. The method's relative error of
-// their period is (w h)^2/12. With h = 0.1 us it shifts their phase by 1.4e-3 rad in a contact of T
-// = 0.5 ms.
+// About a tenth of the speed is due to vibrations of w = 1.5e5 rad/s. The relative error of their
+// period in generalized-alpha is (w h)^2/12. With h = 0.1 us, this error shifts the vibrations by
+// 1.4e-3 rad in a contact of T = 0.5 ms.
 const std::string kPeriodError =
     "a tenth of the speed vibrates at w = 1.5e5/s: phase error (w h)^2/12 w T = 1.4e-3";
 const std::string kSlowExit = "the same; some exits are slow";
@@ -333,7 +333,7 @@ TEST(Agreement, BothIntegratorsGiveTheSameSixtyCasesFromReleaseToSeparation) {
 TEST(Agreement, EstimatedErrorsBoundTheErrorsOfTheStepsInAllOutputsAndInstantsOfSixtyContacts) {
   const solver::ModelParameters model = solver::preset("standard");
   solver::ModelParameters fine = model;
-  fine.step_factor = 0.25;  // divides errors of order 4 by 256
+  fine.step_factor = 0.25;  // errors of order 4 become 256 times smaller
   const solver::Finger finger(model);
   const solver::Finger companion(solver::companion_model(model));
   const solver::Finger reference(fine);

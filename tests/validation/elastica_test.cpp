@@ -37,14 +37,14 @@ class ClampedBeam {
   struct Tip {
     double x_m;
     double y_m;
-    double angle_rad;  ///< angle of the tangent, in (-pi, pi]
+    double angle_rad;  ///< angle between tangent and x axis, in (-pi, pi]
   };
 
   explicit ClampedBeam(const Properties& properties);
 
-  /// Applies `load` in `increments` equal steps. Throws std::runtime_error if Newton's method does
-  /// not converge: within 50 iterations, its largest correction (for positions in units of an
-  /// element's length) must fall below 1e-12.
+  /// Applies `load` in `increments` equal steps, each solved by Newton's method. Throws
+  /// std::runtime_error unless the largest correction falls below 1e-12 within 50 iterations.
+  /// Corrections of positions are in units of an element's length.
   void load_to(const TipLoad& load, int increments);
   Tip tip() const;
 

@@ -43,8 +43,8 @@ TEST(Energy, BalancesInThePublishedContactsWithBothIntegrators) {
        kBalance, by_generalized_alpha, 1e-6, "stated accuracy"});
 }
 
-/// Returns the change of the total energy in the fall to H = 1 m, divided by the kinetic energy
-/// there.
+/// Returns the change of the total energy in the fall to H = 1 m, divided by the kinetic energy at
+/// the end of this fall.
 double fall_drift(const Motion& motion, const solver::Fall& fall) {
   const solver::Energies before = motion.energies(motion.at_rest());
   const solver::Energies after = motion.energies(fall.state_at(1.0));

@@ -72,8 +72,8 @@ constexpr double kTolerance = 0.005;  // relative
 // fraction is below 1 because exit velocities pass through zero, where relative errors are large.
 constexpr double kMaxPoints = 0.8;
 
-/// Errors of one output at one point, one error per level of the mesh, relative to the limit of the
-/// output. A level has no error if its mode differs from the mode of the finest level.
+/// Errors of one output at one point, one per level of the mesh, relative to the extrapolated value
+/// `limit`. A level has no error if its mode differs from the mode of the finest level.
 struct PointErrors {
   std::size_t point;
   double limit;
@@ -97,8 +97,7 @@ std::size_t points_within(const OutputStudy& output, std::size_t level) {
 }
 
 /// Returns the name under which the errors of an output are collected. All major peaks of F_n,
-/// which include fn_peak_N, count as one output with the largest of their errors. All reactions
-/// also count as one output.
+/// which include fn_peak_N, have one name, and so have all reactions. The largest error counts.
 std::string counted_under(const std::string& name) {
   return name.starts_with("major_peak") ? "major_peaks_N"
          : name.starts_with("reaction") ? "reaction_peaks_N"
@@ -257,7 +256,7 @@ struct StepCase {
   solver::ModelParameters model;
   std::size_t points = 300;
   double least_e =
-      solver::StepChoice::kFastRestitution;  ///< smallest e*; below it, shorter steps are needed
+      solver::StepChoice::kFastRestitution;  ///< smallest e*; a smaller e* needs shorter steps
   double largest_e = 1.0;
   std::vector<double> factors{1.0};  ///< factors that multiply the chosen steps
 };
@@ -271,9 +270,9 @@ struct StepErrors {
   double duration = 0.0;   ///< relative
   double slide = 0.0;      ///< relative
   double stick_s = 0.0;
-  double exit_m_s = 0.0;         ///< larger error of both components of the exit velocity
-  std::int64_t late_sticks = 0;  ///< points whose stick has an error above 5 ns
-  std::int64_t grazing = 0;      ///< points left out because their mode depends on the step
+  double exit_m_s = 0.0;         ///< larger of the errors of both components of the exit velocity
+  std::int64_t late_sticks = 0;  ///< number of points whose stick has an error above 5 ns
+  std::int64_t grazing = 0;      ///< number of points left out: their mode depends on the step
 };
 
 /// Returns variations of the preset `paper`: mesh, contact stiffness, e*, tip mass and lengths.

@@ -61,7 +61,7 @@ Outcome fall_for(const Motion& motion, ChainState state, double duration_s, int 
   return outcome;
 }
 
-/// Returns the state of a contact from touch to `end_s`, with located events.
+/// Follows a contact from touch to `end_s`. Returns the final state and the times of the events.
 Outcome contact_until(const Motion& motion, const ContactParameters& parameters, ChainState state,
                       double dt_s, double end_s) {
   Contact contact(parameters, motion.tip(state), {dt_s, dt_s});

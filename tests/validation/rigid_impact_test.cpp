@@ -45,8 +45,8 @@ CaseResult solved(const RigidImpact::Parameters& p, double dt_s) {
                                motion.moving(p.V0_m_s), {});
 }
 
-/// Returns the largest error of force peaks (relative to the largest force), exit velocity (to the
-/// speed at touch), slide (to that speed times the duration), duration and stick (to the duration).
+/// Returns the largest relative error. Force peaks are relative to the largest force, velocities to
+/// the speed at touch, times to the duration, and the slide to speed at touch times duration.
 double largest_error(const CaseResult& result, const RigidImpact& right, double speed_m_s) {
   double largest = std::abs(result.duration_s / right.duration_s() - 1.0);
   EXPECT_EQ(result.peaks.size(), right.fn_peaks_N().size());
@@ -67,7 +67,7 @@ struct Regime {
   double mu;
   double vt_m_s;
 };
-/// Regimes of Stronge's theory, each with the mode of the closed form.
+/// Regimes of Stronge's theory. The closed form gives the mode of each.
 constexpr std::array<Regime, 5> kRegimes{{{"slip throughout", "sC sR", 0.3, 3.0},
                                           {"stick, then slip in restitution", "SC SR sR", 0.8, 1.0},
                                           {"slip, stick, slip", "sC SC SR sR", 0.1, 1.0},
@@ -95,7 +95,7 @@ TEST(RigidImpact, WorkOfRestitutionIsMinusTheSquareOfTheRestitutionTimesThatOfCo
       const RigidImpact::Parameters p = flying_rod(regime.mu, e_star, regime.vt_m_s);
       const CaseResult result = solved(p, RigidImpact(p).duration_s() / 400);
       ASSERT_EQ(result.peaks.size(), 1U);
-      // Compression stores F^2/2k. Restitution returns this energy minus the loss in the result.
+      // Compression stores F^2/2k. Restitution loses `restitution_J` and returns the rest.
       const double stored_J = result.fn_peak_N * result.fn_peak_N / (2.0 * p.k_N_m);
       const double given_back_J = stored_J - result.energy.restitution_J;
       largest = std::max(largest, std::abs(given_back_J / stored_J - e_star * e_star));
@@ -208,7 +208,7 @@ TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithExplicitSteps) {
 }
 
 TEST(RigidImpact, StiffChainOfTwoLinksStrikesAsRigidLinksWithGeneralizedAlpha) {
-  // This integrator does not need shorter steps for stiffer links.
+  // Generalized-alpha does not need shorter steps for stiffer links.
   const StiffLinks links(1e6);
   const solver::Chain chain(links.model);
   const solver::GeneralizedAlphaMotion motion(links.model);

@@ -216,7 +216,7 @@ TEST(PointsOfABatch, AFailingFallIsSolvedOnceAndFailsOnlyThePointsOfItsModels) {
   model.elements_per_link = 1;
   model.integrator = solver::Integrator::kGeneralizedAlpha;
   *recipe.mutable_model() = protocol::to_message(model);
-  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails with 0.025 s
+  add_model_axis(recipe, "dt_fall", {0.025, 1e-4});  // Newton's method fails with steps of 0.025 s
   const Batch batch = batch_of(recipe);
   CountedFalls falls;
   solver::FallCache cache(kFallBytes, falls.solve);
@@ -248,7 +248,7 @@ TEST(PointsOfABatch, EstimatedErrorsAreAddedIfTheStudyWantsThemAndChangeNothingE
   }
 }
 
-/// Returns the server's order to trace a point.
+/// Returns the message with which the server requests the trace of a point.
 protocol::TraceOrder order_of(const Batch& batch, std::uint64_t number) {
   const protocol::Point point = batch.points().point(number);
   protocol::TraceOrder order;

@@ -68,7 +68,7 @@ class Gate {
   int open_ = 0;
 };
 
-/// Reports each of these points as failed. Calls `before` before each report.
+/// Reports each point of `points` as failed. Calls `before` before each report.
 void fail_all(
     solver::PointSource& points, const solver::TakeOutcome& take,
     const std::function<void()>& before = [] {}) {
@@ -276,7 +276,7 @@ TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolve
       [&](const Batch& at_hand, auto& points, const auto& take) {
         if (at_hand.number() == 1 && ++taken_up > 2) {
           ADD_FAILURE() << "a dropped batch was started";
-          std::abort();  // a failure alone would not end this test
+          std::abort();  // ADD_FAILURE alone would not end this test
         }
         fail_all(points, take, [&] {
           if (at_hand.number() == 1) {

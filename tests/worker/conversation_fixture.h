@@ -182,7 +182,7 @@ class ConversationTest : public ::testing::Test {
     return batches;
   }
 
-  /// Returns nothing while the conversation has not ended.
+  /// Returns the worker's exit code; nothing before the conversation has ended.
   std::optional<int> exit_code() const {
     return finish() ? std::optional(finish()->exit_code) : std::nullopt;
   }

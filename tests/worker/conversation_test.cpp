@@ -207,7 +207,7 @@ TEST_F(ConversationTest, ABatchOfAnUnknownStudyOrUnknownPointsMakesTheWorkerReco
 TEST_F(ConversationTest, ABatchMayBeSeveralRangesInAnyOrder) {
   join();
   auto message = batch_message(7, 31, 20, 10);
-  for (const std::int64_t number : {-25, 2, 90, 3}) {  // adds points 5 and 6, then 97 to 99
+  for (const std::int64_t number : {-25, 2, 90, 3}) {  // two ranges: points 5 to 6 and 97 to 99
     message.mutable_batch()->add_ranges(number);
   }
   receive(message);

@@ -41,7 +41,7 @@ double unresolved_waves(const ModelParameters& model) {
   return std::pow(element_m * wavenumber_1_m / std::numbers::pi, 4);
 }
 
-/// Factor from the difference between the meshes to the error of an output of order `order`.
+/// Estimated error of an output of order `order`, divided by the difference between the meshes.
 double factor(const ModelParameters& model, int order) {
   const ModelParameters companion = companion_model(model);
   const double ratio = static_cast<double>(model.elements_per_link) / companion.elements_per_link;
@@ -51,10 +51,10 @@ double factor(const ModelParameters& model, int order) {
 struct SolvedPoint {
   FingerPoint point;
   std::optional<CaseResult> result = {};
-  std::optional<Finger> companion = {};  ///< empty without a coarser mesh or without a fall on it
+  std::optional<Finger> companion = {};  ///< empty if no coarser mesh exists or its fall fails
 };
 
-/// Solves the next points of the source. Passes failed ones to `sink`. Sets `ended` at its end.
+/// Solves points of `source`. Passes failed points to `sink`. Sets `ended` if `source` is empty.
 std::vector<SolvedPoint> solve_next(const FingerPoints& source, const TakeOutcome& sink,
                                     bool& ended) {
   using Clock = std::chrono::steady_clock;
@@ -114,7 +114,7 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   const double smooth = factor(model, kSmoothOrder);
   const double rough = factor(model, kRoughOrder);
   const double speed_m_s = std::hypot(result.vt_in_m_s, result.vn_in_m_s);
-  // Error that automatic steps leave. If the user sets the step, the difference includes its error.
+  // Error of automatic steps. The difference includes the error of a step that the user sets.
   const double step_error = model.dt_s == 0.0 ? model.tolerance : 0.0;
   const auto error_of = [&](double difference, double scale) -> std::optional<double> {
     const double error = std::abs(difference) / std::abs(scale);
@@ -158,7 +158,7 @@ ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult
   return outcome.result ? estimated_errors(model, result, *outcome.result) : ErrorEstimate{};
 }
 
-// Chains of different shapes share no lanes, so companions are solved after the points.
+// Lanes are shared by chains of one shape only, so the companions are solved after the points.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,
                               const TakeOutcome& sink) {
   for (bool ended = false; !ended;) {

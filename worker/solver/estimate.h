@@ -8,7 +8,7 @@
 namespace oblique::solver {
 
 /// `model` with half as many elements a link, rounded down (1 stays 1), and steps in contact twice
-/// as long, where these are stable. Solving it takes about a quarter of the time, besides its fall.
+/// as long, where these are stable. Without its fall, solving it takes about a quarter of the time.
 ModelParameters companion_model(const ModelParameters& model);
 
 /// Estimates the errors of `result`, the result of a point of `model`, from its differences to
@@ -19,12 +19,12 @@ ModelParameters companion_model(const ModelParameters& model);
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 
-/// Like estimated_errors(), but solves the companion, with a fall from `falls`. Empty if there is
-/// no coarser mesh or the companion has no answer.
+/// Like estimated_errors(), but solves the companion, with a fall from `falls`. The estimate is
+/// empty if there is no coarser mesh or the companion fails.
 ErrorEstimate errors_by_companion(const ModelParameters& model, const CaseResult& result,
                                   FallCache& falls);
 
-/// Like solve_points(), with estimated errors in each result whose companion has an answer. Solves
+/// Like solve_points(), but adds estimated errors to each result whose companion is solved. Solves
 /// points for at most one second, at most 256, and then their companions. So outcomes come in
 /// bursts.
 void solve_points_with_errors(const FingerPoints& source, FallCache& falls,

@@ -16,7 +16,7 @@ struct Entry {
   const char* program;
   const char* point;
   int signal;
-  int highest;  ///< largest random occurrence; for `time`, largest time [ms]
+  int highest;  ///< largest random value of KillCase::occurrence
 };
 
 constexpr bool kApart = false;
@@ -27,14 +27,14 @@ constexpr const char* kWorker = "oblique-worker";
 constexpr const char* kNoProcess = "";
 constexpr int kNoSignal = 0;
 
-// Names of storms. An entry with a storm has such a name in place of a point.
+// Names of storms. An entry with a storm contains one of these names as `point`.
 constexpr const char* kKilledWorkers = "storm:killed workers";
 constexpr const char* kCutConnections = "storm:cut connections";
 constexpr const char* kVanishingPeers = "storm:vanishing peers";
 
-// The test that always runs uses the first 23 entries. They contain every class of point, both
-// signals, and every program, started separately and by `oblique run`. Without a signal a run
-// reaches each point as often as its entry requires.
+// The first 23 entries run in every test run. They contain every class of point, both signals, and
+// every program, started separately and by `oblique run`. A run without a signal usually reaches
+// the point of an entry at least `highest` times.
 constexpr std::array kMatrix{
     Entry{kApart, kServer, "before-commit", SIGKILL, 8},
     Entry{kApart, kServer, "after-commit", SIGKILL, 8},

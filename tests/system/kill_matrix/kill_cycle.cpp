@@ -26,9 +26,9 @@ constexpr std::chrono::milliseconds kPollInterval{5};
 constexpr int kMaxAttempts = 6;
 constexpr int kPointsFailed = 1;  ///< exit code of a complete study with failed points
 
-// The study has several models, because a batch ends at the end of a model. The first block takes
-// long enough for heartbeats and about twenty commits. A filter leaves out half of the second
-// block. Both points of the last block fail.
+// A batch ends with a model if possible. So batches of this study, which has several models, also
+// end in its middle. The first block takes long enough for heartbeats and about twenty commits. A
+// filter leaves out half of the second block. Both points of the last block fail.
 constexpr const char* kStudy = R"(name = "matrix"
 [model]
 preset = "paper"
@@ -80,7 +80,7 @@ class FaultInjection {
   FaultInjection& operator=(const FaultInjection&) = delete;
 
   /// Returns the environment of `program`. If the case names `program`, the environment contains
-  /// the order for the signal.
+  /// OBLIQUE_KILL_AT, which defines the signal (kill_points.cpp).
   Environment environment(const std::string& program) const {
     Environment all = plain_environment();
     if (program == case_.program) {
@@ -92,8 +92,8 @@ class FaultInjection {
     }
     return all;
   }
-  /// Returns the environment of processes that get no signal. `processes_of` finds all processes of
-  /// a cycle, also children of children, by TMPDIR.
+  /// Returns the environment of processes that get no signal. All processes of a cycle inherit its
+  /// TMPDIR, by which `processes_of` finds them.
   Environment plain_environment() const { return {{"TMPDIR", folder_}}; }
 
   bool has_happened() const { return target() > 0; }
@@ -332,7 +332,7 @@ constexpr unsigned kAtOncePerCore = 4;
 
 struct CycleOutcome {
   bool reached = false;                ///< the signal was sent, or a fault of the storm happened
-  std::optional<std::string> failure;  ///< reason, and standard error of the processes
+  std::optional<std::string> failure;  ///< why the cycle failed, and the processes' standard error
 };
 
 /// Runs the study in a temporary folder with the signal of the case, and compares its database with

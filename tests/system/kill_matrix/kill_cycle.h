@@ -11,7 +11,7 @@
 
 namespace oblique::test {
 
-/// One cycle of the kill matrix: the signal, the process that gets it, the time, and what follows.
+/// A cycle of the kill matrix: a signal, when and to which process it is sent, how a halt ends.
 struct KillCase {
   std::uint64_t seed = 0;
   bool all_in_one = false;           ///< true: `oblique run` starts all programs
@@ -24,7 +24,7 @@ struct KillCase {
   // For SIGSTOP only.
   std::chrono::milliseconds stopped{0};  ///< duration of the halt
   int then = 0;                          ///< signal after the halt: SIGCONT or SIGKILL
-  bool server_stops_first = false;       ///< order of stopping; false: workers first
+  bool server_stops_first = false;       ///< false: the workers stop before the server
 
   bool is_killed() const;
 };
@@ -51,7 +51,7 @@ class KillStudy {
   std::string undisturbed() const { return folder_.file("undisturbed.db"); }
 
   static constexpr const char* kName = "matrix";
-  static constexpr int kFailing = 2;  ///< points whose step is too long to be stable, so they fail
+  static constexpr int kFailing = 2;  ///< number of points that fail, because a step is unstable
 
  private:
   TemporaryFolder folder_;

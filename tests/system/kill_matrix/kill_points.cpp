@@ -100,7 +100,7 @@ std::string kind_of(const std::string& program, bool sent, const void* data, std
   constexpr unsigned char kNumberInFieldOne = 0x08;
   const bool with_client = !bytes.empty() && bytes.front() == kNumberInFieldOne;
   const Kinds& kinds = kinds_of(program, sent, with_client);
-  // The first field that contains a message is the kind; only numbers precede it.
+  // The kind is the first field that contains a message. Earlier fields contain only numbers.
   while (!bytes.empty()) {
     const std::uint64_t tag = take_varint(bytes);
     constexpr std::uint64_t kNumber = 0;

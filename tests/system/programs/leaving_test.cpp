@@ -114,7 +114,7 @@ TEST_F(LeavingProgramTest, AWorkerThatNeverReachedItsServerExitsWithOneAndNamesT
 
 TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
   Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
-  // The first attempt takes 3 s. The limit of 5 s ends during the second attempt.
+  // The first attempt to connect takes 3 s. The idle limit of 5 s ends during the second attempt.
   EXPECT_EQ(refused.wait(), 1);
   const std::string output = refused.err();
   EXPECT_NE(output.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << output;

@@ -155,7 +155,7 @@ void SlurmCluster::start_authentication() {
 
 std::unique_ptr<Process> SlurmCluster::started(const std::string& program,
                                                const std::vector<std::string>& arguments) const {
-  // setpriv lets the daemons end with this process.
+  // setpriv makes the kernel kill the daemons when this process ends.
   std::vector<std::string> words{"--pdeathsig", "KILL", installed(program)};
   words.insert(words.end(), arguments.begin(), arguments.end());
   return std::make_unique<Process>(folder_, installed("setpriv"), words, environment());

@@ -13,8 +13,8 @@ namespace oblique::test {
 
 /// A Slurm cluster on loopback: munged, slurmctld, and one slurmd for each of two nodes, n1 and n2.
 /// The nodes are this machine under two names, with one core each. One folder contains all files of
-/// the cluster. The partitions `work` (the default) and `grace` (30 s for preempted jobs) requeue
-/// jobs; the partition `urgent` preempts their jobs.
+/// the cluster. Jobs of the partition `urgent` preempt jobs of `work` (the default) and `grace`,
+/// which are requeued. Preempted jobs of `grace` may run for 30 s more.
 class SlurmCluster {
  public:
   /// Returns the reason why Slurm cannot run here; empty if it can.

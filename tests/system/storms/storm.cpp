@@ -55,7 +55,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
     static_cast<void>(
         socket.send(zmq::buffer(protocol::encode(*message)), zmq::send_flags::dontwait));
   }
-  constexpr int kMaxMessages = 4;  // welcome, study and two batches
+  constexpr int kMaxMessages = 4;  // the server sends a welcome, a study and two batches
   for (int i = 0; i < kMaxMessages; ++i) {
     zmq::message_t frame;
     protocol::ServerToWorker message;

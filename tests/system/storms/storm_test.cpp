@@ -1,4 +1,4 @@
-// Every point is solved although workers are lost repeatedly, if one worker is undisturbed.
+// If one worker is undisturbed, every point is solved although other workers are lost repeatedly.
 #include <optional>
 #include <string>
 #include <vector>

@@ -85,7 +85,7 @@ Results solve(const ModelParameters& model, const std::vector<solver::Point>& po
   return results;
 }
 
-/// An output: its estimated error, and its difference between two results in the same unit.
+/// An output with its estimated error. `difference` compares two results, in the estimate's unit.
 struct Output {
   std::string_view name;
   std::optional<double> ErrorEstimate::*estimate;
@@ -209,7 +209,7 @@ void check(const Settings& settings) {
   const auto points = random_points(settings);
   ModelParameters finest = model_of(settings, settings.truth);
   finest.step_factor = 0.5;
-  finest.integrator = solver::Integrator::kExplicit;  // faster, and equally accurate
+  finest.integrator = solver::Integrator::kExplicit;  // faster, at equal accuracy
   const Results truth = solve(finest, points);
   for (const int mesh : settings.meshes) {
     check_mesh(model_of(settings, mesh), points, truth);

@@ -100,7 +100,7 @@ TEST(EstimatedErrors, GrowWithTheDifferenceAndWithWavesThatTheCoarserMeshDoesNot
   };
   EXPECT_NEAR(error(16, far) / error(16, near), 2.0, 1e-9);
   EXPECT_GT(error(4, near), 5.0 * error(16, near));
-  // If both meshes resolve the waves, the error is a third of their difference (order 2).
+  // If both meshes resolve the waves, the estimate is a third of the difference (order 2).
   EXPECT_NEAR(error(64, near), 0.01 / 3.0, 1e-5);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), near).mode_same, 1);
   EXPECT_EQ(estimated_errors(coarse_model(4), some_result(), far).mode_same, 0);

@@ -12,14 +12,14 @@ namespace oblique::solver {
 /// the regime began. In each regime the force is F_0 - K r, so that
 ///
 ///   r'' = W F_0 - W K r,
-///   K = diag(k/eta2, k_n) in stick, with the rows (0, -s mu k_n) and (0, k_n) in slip.
+///   K = diag(k/eta2, k_n) in stick; in slip K has the rows (0, -s mu k_n) and (0, k_n).
 ///
 /// Eigenmodes solve this equation. A regime ends at a root of a function of the solution, found by
 /// scanning and bisection. The closed form shares no code with the solver.
 class RigidImpact {
  public:
   struct Parameters {
-    Eigen::Matrix2d W_per_kg;  ///< inverse mass; order t, n
+    Eigen::Matrix2d W_per_kg;  ///< inverse mass; index 0 is tangential, 1 normal
     double k_N_m;
     double eta2;
     double mu;
@@ -71,7 +71,7 @@ class RigidImpact {
   struct Ending {
     End end;
     double t_s;  ///< time from the start of the regime
-    double s;    ///< direction in which P slides after kSlip
+    double s;    ///< if `end` is kSlip: direction in which P then slides
   };
 
   Motion begin(const Regime& regime, const Eigen::Vector2d& F_N) const;

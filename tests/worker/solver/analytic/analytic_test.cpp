@@ -11,7 +11,7 @@ namespace {
 
 TEST(MittagLeffler, HasKnownValuesAndDerivative) {
   EXPECT_DOUBLE_EQ(mittag_leffler_three_halves(2.0, 0.0), 1.0);
-  // The derivative of t E_{3/2,2}(-t^{3/2}) by t is E_{3/2,1}(-t^{3/2}).
+  // The derivative of t E_{3/2,2}(-t^{3/2}) with respect to t is E_{3/2,1}(-t^{3/2}).
   const auto f = [](double t) { return t * mittag_leffler_three_halves(2.0, -std::pow(t, 1.5)); };
   for (const double t : {0.5, 1.0, 2.0, 4.0}) {
     EXPECT_NEAR((f(t + 1e-4) - f(t - 1e-4)) / 2e-4,

@@ -34,7 +34,7 @@ double BeamEndOnSpring::force_rate_N_s(double t_s) const {
 }
 
 double BeamEndOnSpring::peak_time_s() const {
-  // The first maximum is later than the time at which the argument of E_{3/2,b} is -1.
+  // The force has its first maximum later than the time at which -k C t^{3/2} is -1.
   const double scale_s = std::pow(k_N_m_ * C_, -2.0 / 3.0);
   double low = scale_s;
   double high = scale_s;

@@ -17,9 +17,9 @@ constexpr double kRelative = 3e-5;
 constexpr double kForceDigit_N = 0.005;
 constexpr double kTimeDigit_us = 0.0005;
 constexpr double kStickDigit_us = 0.005;
-/// Allowed errors relative to the duration: first of duration and stick, then of the ends of
-/// phases. Minima of the force are flat. So the default tolerance of 1e-5 moves the end of a phase
-/// by up to 3.5 ns.
+/// Errors allowed in duration and stick (kRelativeTime) and in the ends of phases
+/// (kRelativeInstant), divided by the duration. Minima of the force are flat. So the default
+/// tolerance of 1e-5 moves the end of a phase by up to 3.5 ns.
 constexpr double kRelativeTime = 3e-6;
 constexpr double kRelativeInstant = 6e-6;
 constexpr double kSlideDigit_mm = 0.000005;

@@ -125,7 +125,7 @@ TEST(SolveErrors, TheContactFailsForStatesThatAreNotFiniteAndContactsWithoutEnd)
   const ContactParameters parameters{1e6, 1.2, 0.5, 1.0};
   Contact contact(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
   EXPECT_THROW(contact.judge({kNaN, 0.0, 1.0, -1.0}, {}), SolveError);
-  // This tip sinks forever.
+  // A contact whose tip sinks forever.
   Contact sinking(parameters, {0.0, 0.0, 1.0, -1.0}, {1e-5, 1e-5});
   TipState tip{0.0, 0.0, 1.0, -1.0};
   const auto sink = [&] {

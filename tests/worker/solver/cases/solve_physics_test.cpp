@@ -139,7 +139,7 @@ void expect_in_order(const CaseResult& r) {
 }
 
 /// Returns a random point. In one of six points, one value is extreme. H stays below the largest
-/// drop, because the tip has no speed there.
+/// drop, at which the tip has no speed.
 Point random_point(const Finger& finger, std::mt19937_64& generator) {
   const auto uniform = [&generator](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(generator);

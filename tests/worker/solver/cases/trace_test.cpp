@@ -66,8 +66,8 @@ TEST(Trace, ForcesStayInsideTheFrictionConeAndOnItInSlip) {
       EXPECT_LE(std::abs(row.ft_N), limit_N + 1e-6);
       if (row.state[0] == 's') {
         EXPECT_NEAR(std::abs(row.ft_N), limit_N, 1e-6);
-        // The instant at which P stops has an error of up to 1e-13 s. With 1e4 N and 1e4 m/s^2 this
-        // allows 1e-5 W.
+        // The instant at which P stops has an error of up to 1e-13 s. In this time, a force of
+        // 1e4 N at an acceleration of 1e4 m/s^2 reaches a power of 1e-5 W.
         EXPECT_LE(row.ft_N * row.vP_m_s, 1e-5) << "friction opposes the motion of P";
       }
     }
@@ -138,8 +138,8 @@ TEST(Trace, TangentialPeaksAreTheLocalMaximaOfTheTangentialForce) {
   }
   for (const Traced& t : many) {
     SCOPED_TRACE(t.result.mode);
-    // Keeps rows at distinct instants, so that the two rows of an event count once. Between
-    // instants that count as equal, less than 1e-11 s apart, the force changes by at most 1e-4 N.
+    // Keeps one row per instant, because an event has two rows. Rows less than 1e-11 s apart count
+    // as one instant. In this time the force changes by at most 1e-4 N.
     std::vector<TraceRow> rows;
     for (const TraceRow& row : t.rows) {
       if (rows.empty() || row.t_s > rows.back().t_s + 1e-11) {
@@ -248,8 +248,8 @@ TEST(Trace, PeaksOfTheReactionsAgreeWithTheRows) {
         largest_N = std::max(
             largest_N, std::hypot(row.reactions_N[2 * joint], row.reactions_N[2 * joint + 1]));
       }
-      // A peak between two rows can exceed them by (omega h)^2/8 times the fastest vibration. With
-      // one element per link, this vibration is a large part of the reaction.
+      // A peak between two rows can exceed both by (omega h)^2/8 of the amplitude of the fastest
+      // vibration. With one element per link, this amplitude is a large part of the reaction.
       EXPECT_GT(t.result.reaction_peaks[joint].force_N, 0.998 * largest_N);
       EXPECT_LT(t.result.reaction_peaks[joint].force_N, 1.02 * largest_N);
     }

@@ -176,7 +176,7 @@ TEST(ChainFrequency, IsTheLargestEigenvalueOfTheNumericalJacobian) {
 }
 
 TEST(ChainFrequency, GivesTheKnownStabilityLimitsOfVerlet) {
-  // The limit is 2/omega. The known values hold for the cross-section as printed in the paper.
+  // The limit of the step is 2/omega. Known values are for the cross-section printed in the paper.
   struct Known {
     int elements_per_link;
     double dt_s;

@@ -124,7 +124,7 @@ TEST(GuessEvent, ATurnIsWhereVnRisesThroughZero) {
     double a, b, c;  ///< of V_n
     bool is_compression;
     bool is_fresh;
-    double fraction;  ///< −1 if there is no event
+    double fraction;  ///< time of the event in steps; −1 without an event
     bool is_inside_only = false;
   };
   const Case cases[] = {
@@ -164,7 +164,7 @@ TEST(GuessEvent, AForceThatFallsToZeroAlongACubicIsFoundExactly) {
   const ContactLaw law = restitution(false);
   const TipMotion motion = with_normal_velocity(0.03, 0.04, 0.03);
   const auto found = guess(law, ContactEvent::kSeparation, motion);
-  // F_n does not reach zero in this step ...
+  // F_n does not reach zero in this step.
   EXPECT_FALSE(found);
   const TipMotion faster = with_normal_velocity(0.1, 0.04, 0.03);
   const auto separation = guess(law, ContactEvent::kSeparation, faster);

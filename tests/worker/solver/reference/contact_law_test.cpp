@@ -12,7 +12,7 @@ namespace {
 constexpr ContactParameters kParameters{2.7e7, 1.25, 0.5, 0.7};
 constexpr TipState kTouch{0.6, -1.0, -3.0, -2.0};
 
-/// Returns a law in slip or stick after `turns` sign changes of V_n. Its anchors are not zero.
+/// Returns a law with nonzero anchors, in slip or stick, after `turns` sign changes of V_n.
 ContactLaw law_after(int turns, bool stick) {
   TipState tip{0.6, -1.0, stick ? -0.5 : -3.0, -2.0};
   ContactLaw law(kParameters, tip);

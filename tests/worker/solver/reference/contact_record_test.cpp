@@ -191,7 +191,7 @@ TEST(WithoutRipples, RemainingExtremaAlternateStartAndEndWithAPeakAndContainTheL
 
 constexpr double k_N_m = 1e6;
 constexpr double kEta2 = 1.25;
-constexpr double kStep_s = 0.97e-6;  // chosen so that no event is at the end of a step
+constexpr double kStep_s = 0.97e-6;  // no step of this length ends at an event
 
 /// Returns the tip's state during half a period, in which V_n goes from -1 to 1 m/s.
 TipState half_period(double t_s, double vt_m_s) {
@@ -256,8 +256,8 @@ TEST(ContactMargin, AtTouchIsTheDistanceBetweenStickAndSlip) {
 }
 
 TEST(ContactMargin, OfASimpleBounceWithoutFrictionIsOne) {
-  // The contact has one compression and ends at the speed of touch. Stick does not count, because P
-  // never sticks without friction.
+  // The contact has one compression, and the tip leaves as fast as it arrived. Stick does not
+  // count, because P never sticks without friction.
   const Contact contact = followed([](double t_s) { return half_period(t_s, 1e-9); }, 0.0, 1e-3);
   ASSERT_TRUE(contact.finished());
   EXPECT_EQ(contact.margin().nearest(100.0).distance, 1.0);
@@ -282,8 +282,8 @@ TEST(ReactionPeaks, MeansOverIntervalsGiveThePeakOfTheFunction) {
     add(peaks, t_s + kSpan_s, kSpan_s, 7.0 * mean_of_sine(t_s, t_s + kSpan_s));
   }
   const ReactionPeak peak = peaks.peaks().at(0);
-  // The mean over an interval is lower than the peak by the fraction 0.2^2/24 = 1.7e-3. After its
-  // correction, an error of order 4 remains.
+  // The mean over an interval is lower than the peak by the fraction 0.2^2/24 = 1.7e-3.
+  // ReactionPeaks corrects this error; an error of order 4 remains.
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 1e-4);
   EXPECT_NEAR(peak.t_s, M_PI / 2.0, 1e-3);
 }
@@ -292,7 +292,7 @@ TEST(ReactionPeaks, ValuesAtInstantsGiveThePeakBetweenThem) {
   ReactionPeaks peaks(1);
   for (double t_s = 0.0; t_s < kDuration_s; t_s += 0.2) {
     add(peaks, t_s, 0.0, 7.0 * std::sin(t_s));
-    add(peaks, t_s, 0.0, 7.0 * std::sin(t_s));  // repeated, like the two rows of an event
+    add(peaks, t_s, 0.0, 7.0 * std::sin(t_s));  // added twice, like the rows of an event
   }
   const ReactionPeak peak = peaks.peaks().at(0);
   EXPECT_NEAR(peak.force_N, 7.0, 7.0 * 2e-4);
@@ -324,8 +324,8 @@ TEST(ReactionPeaks, TheLargestOfSeveralPeaksCounts) {
 }
 
 TEST(ReactionPeaks, APeakBetweenInstantsCountsEvenIfAnInstantOfAnotherPeakIsHigher) {
-  // The maximum of 1 - (t - 1)^2 is at an added instant. The maximum of 1.005 - (t - 3.1)^2 is in
-  // the middle between two instants.
+  // The maximum of 1 - (t - 1)^2 is at an instant of the loop. The maximum of 1.005 - (t - 3.1)^2
+  // is in the middle between two instants.
   ReactionPeaks peaks(1);
   for (int i = 0; i <= 20; ++i) {
     const double t_s = 0.2 * i;

@@ -66,8 +66,8 @@ std::vector<double> tangential_maxima_N(const RigidImpact& exact) {
   return maxima_N;
 }
 
-/// Compares a contact with the closed form. With order 4 and a step of 2e-3 rad, its errors are
-/// 1e-11.
+/// Compares a contact with the closed form. The integrator's order is 4, so with a step of 2e-3 rad
+/// the errors are 1e-11.
 void expect_closed_form(const RigidImpact::Parameters& p, double tolerance = 1e-9) {
   const RigidImpact exact(p);
   const CaseResult result = solved(p);
@@ -146,8 +146,8 @@ TEST(ContactOfARigidBody, EventLocationKeepsTheOrder) {
 }
 
 TEST(ContactOfARigidBody, ABallWithEqualStiffnessesSticksUntilSeparationOnTheFrictionCone) {
-  // F_n and F_t reach zero together. So separation coincides with slip in both directions.
-  // Separation comes first.
+  // F_n and F_t reach zero together. So separation coincides with the start of slip in both
+  // directions. Separation ends the contact before slip begins.
   const auto p = impact(1.0, 0.0, 1.0, 2.0, 1.0, 0.5, -1.0, 1.0);
   const CaseResult result = solved(p);
   EXPECT_EQ(result.mode, "SC SR");
