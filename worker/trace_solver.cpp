@@ -55,7 +55,7 @@ void TraceRows::move_to(protocol::Trace& trace) {
   trace.set_instants(instants_);
   trace.set_every(every_);
   if (is_too_long_) {
-    // Any `every` keeps the first and the last instant.
+    // The first and the last instant are kept for every value of `every`.
     const std::uint64_t always = always_kept_ + 2;
     const std::uint64_t room = most_rows() > always ? most_rows() - always : 0;
     trace.set_every(room == 0 ? instants_ + 1 : (instants_ + room - 1) / room);

@@ -23,13 +23,13 @@ class TraceRows {
   TraceRows(std::uint64_t every, std::size_t most_bytes);
 
   void add(const solver::TraceRow& row);
-  /// Moves the rows into the message. If they need more than `most_bytes`, the message gets no rows
-  /// but the smallest `every` with which they would fit.
+  /// Moves the rows into the message. If they need more than `most_bytes`, the message contains no
+  /// rows, only the smallest `every` with which they would fit.
   void move_to(protocol::Trace& trace);
 
  private:
   struct Row {
-    std::uint64_t instant;  ///< its number in the contact
+    std::uint64_t instant;  ///< number of the instant in the contact
     bool is_always_kept;
     char state;
     std::vector<double> numbers;
@@ -50,7 +50,7 @@ class TraceRows {
 };
 
 /// Solves the point of an order with a fall from `falls` and passes its instants to `sink`. Returns
-/// the result with the point number 0; a failed result for a wrong order.
+/// the result, with the point number 0. For an invalid order it is a failed result.
 protocol::PointResult solve_trace(const protocol::TraceOrder& order,
                                   const solver::Tracing::Sink& sink, solver::FallCache& falls);
 
@@ -68,12 +68,12 @@ class TraceSolver {
 
   /// Declines the order if another one is being solved.
   void take(const protocol::TraceOrder& order);
-  /// Declines the order as soon as its point is solved. Ignores unknown numbers.
+  /// Declines the order with this number once its point is solved. Ignores an unknown number.
   void cancel(std::uint64_t trace_id);
   /// Leaves all orders so far without an answer.
   void drop_all();
   bool is_solving() const;
-  /// Answers since the last call.
+  /// Returns the answers that became ready since the last call.
   std::vector<protocol::Trace> collect();
 
  private:

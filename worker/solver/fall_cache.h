@@ -39,7 +39,7 @@ class FallCache {
   /// solving the fall of `model`, solves only falls of `ahead`, then waits for that thread.
   FallOutcome fall(const ModelParameters& model, std::span<const ModelParameters> ahead = {});
 
-  /// The falls of all models; missing ones are solved side by side.
+  /// Returns the falls of `models`. Solves missing ones side by side.
   std::vector<FallOutcome> falls(std::span<const ModelParameters> models);
 
   /// The fall of `model` if it is kept. Does not solve or wait.
@@ -49,7 +49,7 @@ class FallCache {
   struct Entry {
     ModelParameters model;               ///< as returned by fall_model()
     std::optional<FallOutcome> outcome;  ///< empty while the fall is being solved
-    bool is_used = false;                ///< false if the fall was only solved ahead
+    bool is_used = false;                ///< whether the fall was returned to a caller
   };
   using Entries = std::list<Entry>;
 

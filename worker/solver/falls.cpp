@@ -24,7 +24,7 @@ std::shared_ptr<const Motion> make_motion(const ModelParameters& model, const Ch
   return std::make_shared<ExplicitMotion>(chain);
 }
 
-/// Stepping is faster than collocation below this number of explicit steps in sqrt(2 length/g).
+/// Explicit steps are faster than collocation if fewer than this fill the time sqrt(2 length/g).
 constexpr double kFewSteps = 150'000.0;
 
 bool falls_by_collocation(const FallenChain& chain) {
@@ -50,8 +50,8 @@ std::size_t bytes_of(const FallOutcome& outcome) {
   return outcome.fallen ? outcome.fallen->fall().bytes() : kError;
 }
 
-/// Returns why `falling` is outside its domain; else an empty text. A model with a NaN equals no
-/// entry of the cache and would never be found.
+/// Returns why a parameter of `falling` is not allowed, or an empty text. To be called before
+/// find(), because a model with a NaN equals no entry of the cache.
 std::string fault_of(const ModelParameters& falling) {
   try {
     validate(falling);
@@ -75,7 +75,7 @@ bool fall_side_by_side(const ModelParameters& a, const ModelParameters& b) {
 }
 
 std::vector<FallOutcome> solve_falls(std::span<const std::shared_ptr<FallenChain>> chains) {
-  // The integrator, true for collocation, and the numbers of links and of elements per link.
+  // Integrator, whether collocation solves the fall, and numbers of links and elements per link.
   using Kind = std::tuple<Integrator, bool, std::size_t, int>;
   std::map<Kind, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < chains.size(); ++i) {
@@ -219,7 +219,7 @@ void FallCache::solve(const std::vector<Entries::iterator>& claimed,
   std::vector<FallOutcome> outcomes = solve_(models);
   lock.lock();
   solved_.notify_all();
-  for (std::size_t i = claimed.size(); i-- > 0;) {  // the fall needed first is kept longest
+  for (std::size_t i = claimed.size(); i-- > 0;) {  // claimed[0] is needed first and kept longest
     usual_bytes_ = std::max(bytes_of(outcomes[i]), usual_bytes_ / 2);
     claimed[i]->outcome = std::move(outcomes[i]);
     entries_.splice(entries_.begin(), entries_, claimed[i]);
@@ -238,7 +238,7 @@ bool FallCache::has_room_ahead() const {
   return 2 * bytes < most_bytes_;
 }
 
-/// Removes the least recently used falls. Falls solved ahead and not used yet go last.
+/// Removes falls, the least recently used first, and those solved ahead and never used last.
 void FallCache::make_room() {
   std::size_t falls = 0;
   std::size_t bytes = 0;

@@ -13,14 +13,14 @@
 
 namespace oblique::solver {
 
-/// The data that models with equal fall_model() share: a chain, its motion and its fall, which
+/// Data shared by models with equal fall_model(): a chain, its motion, and its fall, which
 /// solve_falls() sets once. Not copied, because the motion refers to the chain.
 class FallenChain {
  public:
   /// Throws InputError when `model` is outside its domain or its dt_fall is above the limit.
   explicit FallenChain(const ModelParameters& model);
 
-  /// The fall_model() of its models.
+  /// Returns the fall_model() of the models that share this data.
   const ModelParameters& model() const { return model_; }
   const Chain& chain() const { return chain_; }
   const std::shared_ptr<const Motion>& motion() const { return motion_; }

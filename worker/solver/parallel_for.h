@@ -36,7 +36,7 @@ inline void parallel_for(std::size_t count, std::size_t threads,
       while (helpers.size() + 1 < std::min(count, threads)) {
         helpers.emplace_back(work);
       }
-    } catch (const std::exception&) {  // fewer threads are enough
+    } catch (const std::exception&) {  // the threads already started do the work
     }
     work();
   }

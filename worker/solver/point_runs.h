@@ -38,8 +38,8 @@ void solve_points_of_models(PointSource& source, FallCache& falls, bool with_err
                             const TakeOutcome& sink);
 
 /// Returns the number of points that a thread takes at a time when `left` points are left. Near the
-/// end it is so small that all threads finish together. Earlier it is enough for about 10 ms of
-/// quick points, so that threads seldom wait.
+/// end the number is so small that all threads finish together. Earlier, quick points of that
+/// number take about 10 ms, so that threads seldom wait.
 std::uint64_t points_of_task(std::uint64_t left, std::size_t threads);
 
 }  // namespace oblique::solver

@@ -63,7 +63,7 @@ class Finger::Parts {
   }
 
   ModelParameters model_;
-  std::shared_ptr<FallenChain> falling_;  ///< empty if a fall was given
+  std::shared_ptr<FallenChain> falling_;  ///< empty if the constructor received a solved fall
   std::shared_ptr<FallCache> falls_;
   mutable std::once_flag fall_once_;
   mutable FallOutcome fall_;
@@ -72,7 +72,7 @@ class Finger::Parts {
 
 namespace {
 
-/// Solves points of any fingers from a source to a sink.
+/// Solves the points of `source`, of any fingers, and passes the outcomes to `sink`.
 class PointSolver {
  public:
   PointSolver(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing)

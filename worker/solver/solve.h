@@ -73,7 +73,7 @@ using TakeOutcome = std::function<void(Outcome&&)>;
 /// result, to `sink` as soon as it is known. Throws only exceptions of `source` and `sink`.
 void solve_points(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing = {});
 
-/// The same for points of one finger. Outcomes are in the order of the points.
+/// Solves points of one finger. Returns the outcomes in the order of the points.
 std::vector<Outcome> solve_points(const Finger& finger, std::span<const Point> points,
                                   const Tracing& tracing = {});
 

@@ -123,7 +123,7 @@ std::uint64_t points_of_task(std::uint64_t left, std::size_t threads) {
 namespace {
 
 using namespace std::chrono_literals;
-// An interrupted call returns within the sum of these times. It abandons a thread in a long fall.
+// An interrupted call returns within the sum of these times. It abandons threads that solve a fall.
 constexpr auto kPollInterval = 50ms;
 constexpr auto kLongestJoin = 140ms;
 
@@ -185,7 +185,7 @@ class Work {
       std::rethrow_exception(failure_);
     }
   }
-  /// Returns when `take` is no longer called.
+  /// After this call `take` is not called any more.
   void stop() {
     const std::lock_guard lock(mutex_);
     stopped_ = true;
@@ -214,7 +214,7 @@ class Work {
       return work_.stopped_ || next_ == end_ ? std::nullopt : std::optional(next_++);
     }
     ModelPoint point(std::uint64_t number) override {
-      if (work_.stopped_) {  // the fall of this point must not be solved
+      if (work_.stopped_) {  // so that the point's fall is not solved
         throw SolveError("stopped");
       }
       return work_.points_[number].point;

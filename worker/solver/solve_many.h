@@ -17,12 +17,12 @@ struct ModelPoint {
 };
 
 struct ManyOptions {
-  std::size_t threads = 0;  ///< 0: one for each core
+  std::size_t threads = 0;  ///< 0 means one for each core
   bool errors = false;      ///< also estimate errors; takes about a quarter more time
   /// Called about every 50 ms on the calling thread with the number of outcomes so far. The work
   /// ends when the function returns false or throws. May be empty.
   std::function<bool(std::size_t outcomes)> goes_on = {};
-  std::shared_ptr<FallCache> falls = {};  ///< empty: falls are kept for this call only
+  std::shared_ptr<FallCache> falls = {};  ///< if null, falls are kept for this call only
 };
 
 /// Solves points on several threads and in all vector lanes. Passes each outcome to `take`, one at

@@ -30,25 +30,25 @@ class StepChoice {
   static constexpr double kImplicitFallFraction = 1.0 / 40'000.0;
   static constexpr double kImplicitContactFraction = 1.0 / 1500.0;
   /// Motion on the spring of restitution is 1/e* times faster than in compression. For e* below
-  /// this, the motion is faster than the chain's own response, and steps shrink with e*.
+  /// this value the motion is faster than the chain's own response, and steps shrink with e*.
   static constexpr double kFastRestitution = 0.4;
-  /// Steps in compression do not shrink below this e*: they only have to resolve the vibrations
-  /// left by restitution.
+  /// For e* below this value steps in compression shrink no further. They only have to resolve the
+  /// vibrations that a previous restitution causes.
   static constexpr double kFastestForCompression = 0.05;
-  /// No contact is shorter than this times sqrt(inertia of the tip/k). Its compression alone takes
-  /// pi/2 times this square root.
+  /// Every contact lasts at least this times sqrt(inertia of the tip/k). Its compression alone
+  /// takes pi/2 times this square root.
   static constexpr double kShortestContact = 0.1;
 
   /// `chain` must outlive this. Throws InputError when model.dt_fall_s is above its limit.
   StepChoice(const Chain& chain, const ModelParameters& model);
 
   double fall_s() const { return fall_s_; }
-  /// Steps in a contact with restitution e_star, times the model's step factor. Throws InputError
-  /// when model.dt_s is above its limit, SolveError when e_star is below kSmallestRestitution, or
-  /// when steps are so short that Contact::kMaxSteps of them cannot reach the end of the contact or
-  /// the tip moves by less than rounding in each.
+  /// Returns the steps in a contact with restitution e_star, multiplied by the model's step factor.
+  /// Throws InputError when model.dt_s is above its limit. Throws SolveError when e_star is below
+  /// kSmallestRestitution, when Contact::kMaxSteps steps cannot reach the end of the contact, or
+  /// when the tip moves by less than rounding in a step.
   ContactSteps contact(double e_star) const;
-  /// Longest stable steps of the explicit integrator in such a contact.
+  /// Longest stable steps of the explicit integrator in a contact with restitution e_star.
   ContactSteps contact_limits(double e_star) const;
 
  private:
@@ -58,9 +58,9 @@ class StepChoice {
   const Chain& chain_;
   ModelParameters model_;
   double tip_inertia_kg_;
-  double compression_limit_s_;  ///< of the explicit integrator
-  double chosen_contact_s_;     ///< step by the tolerance if e* >= kFastRestitution
-  double shortest_s_;           ///< shorter steps in compression are an error
+  double compression_limit_s_;  ///< longest stable explicit step in compression
+  double chosen_contact_s_;     ///< step for the tolerance if e* >= kFastRestitution
+  double shortest_s_;           ///< shortest allowed step in compression
   double fall_s_;
 };
 

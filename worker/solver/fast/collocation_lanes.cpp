@@ -10,7 +10,7 @@ namespace oblique::solver {
 namespace {
 
 constexpr int kMaxIterations = 10;
-/// Corrections that no longer shrink are rounding errors below this multiple of the allowed error.
+/// A correction that no longer shrinks is rounding error if at most this times the allowed error.
 constexpr double kRoundingErrors = 1000.0;
 
 }  // namespace
@@ -81,7 +81,7 @@ void CollocationLanes::attempt() {
   }
 }
 
-/// One iteration of Newton's method, counted from 1. True if a lane needs another one.
+/// Does iteration number `iteration` >= 1 of Newton's method. Returns whether a lane needs more.
 bool CollocationLanes::iterate(int iteration) {
   kernel_.iterate(gauss_collocation(), arrays_);
   bool is_any_active = false;

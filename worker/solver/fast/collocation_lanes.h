@@ -20,7 +20,7 @@ class CollocationLanes {
 
   /// The next step of a lane, and the outcome of its last attempt.
   struct Step {
-    double h_s = 0.0;        ///< 0: the lane does not move
+    double h_s = 0.0;        ///< step length; a lane with 0 does not move
     double error_m = 0.0;    ///< allowed error of positions, mean square over the chain's mass
     bool converged = false;  ///< whether Newton's method converged
     int iterations = 0;
@@ -51,14 +51,14 @@ class CollocationLanes {
     std::array<double, GaussCollocation::kStages> a;
   };
   Coordinate coordinate(std::size_t lane, std::size_t i) const;
-  /// Number of coordinates: 2 rows.
+  /// Number of coordinates of a lane: 2 * rows.
   std::size_t coordinates() const { return vector_; }
 
  private:
   bool iterate(int iteration);
 
   LaneKernel kernel_;
-  std::size_t vector_;  ///< number of positions; also of rates and of accelerations
+  std::size_t vector_;  ///< length of each vector of positions, rates or accelerations
   LaneMemory memory_;
   CollocationArrays arrays_;
   std::vector<double> total_kg_;

@@ -188,7 +188,7 @@ inline void factor_fronts(const ChainTables<Constant>& chain, const TangentBlock
 
 /// Solves `systems` factored systems in place. System s has the s-th chain_factors() numbers of
 /// `factors`, and the real and imaginary parts of its right side in the vectors 2 s and 2 s + 1 of
-/// `x`, each of 2 rows entries. The pin's rows must be zero.
+/// `x`, each of 2 * rows entries. The pin's rows must be zero.
 template <std::size_t systems, class Real, class Constant>
 inline void solve_fronts(const ChainTables<Constant>& chain, const Complex<Real>* factors,
                          Real* x) {
@@ -196,7 +196,7 @@ inline void solve_fronts(const ChainTables<Constant>& chain, const Complex<Real>
   const std::size_t size = 2 * chain.rows;
   const std::size_t elements = chain.links * chain.elements_per_link;
   const std::size_t all_factors = chain_factors(chain.links, chain.elements_per_link);
-  std::size_t first = 0;  // unknown of the front
+  std::size_t first = 0;  // first unknown of the front
   const auto for_each_system = [&](const auto& substitute) {
     for (std::size_t system = 0; system < systems; ++system) {
       Real* const re = x + 2 * system * size + first;

@@ -54,7 +54,7 @@ GaussCollocation::GaussCollocation() {
   for (Eigen::Index k = 0; k < kRows; ++k) {
     const std::complex<double> lambda = eigen.eigenvalues()[k];
     if (lambda.imag() < 0.0) {
-      continue;  // the conjugate of another
+      continue;  // the conjugate eigenvalue is kept instead
     }
     const std::complex<double> squared = lambda * lambda;
     squared_re[pair] = squared.real();

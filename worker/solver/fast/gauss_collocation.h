@@ -25,8 +25,8 @@ struct GaussCollocation {
   double squared_re[kPairs]{};          ///< lambda^2
   double squared_im[kPairs]{};
   double into[kStages][kStages]{};   ///< T^-1
-  double back[kStages][kStages]{};   ///< T, with the conjugates
-  double shift[kStages][kStages]{};  ///< T diag(lambda^2), with the conjugates
+  double back[kStages][kStages]{};   ///< 2 T, to include the conjugate eigenvalues
+  double shift[kStages][kStages]{};  ///< 2 T diag(lambda^2), likewise
   /// Legendre coefficients of the Lagrange polynomials: l_j = sum_k legendre[k][j] P_k(2 c - 1).
   double legendre[kStages][kStages]{};
 

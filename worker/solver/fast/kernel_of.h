@@ -36,8 +36,8 @@ struct Avx512Vectors {
 };
 #endif
 
-/// A number for each lane, in `count` hardware vectors. With two, one computes while the other
-/// waits in the banded solve, whose rows depend on each other.
+/// A number for each lane, in `count` hardware vectors. The rows of the banded solve depend on each
+/// other, so with two vectors one is computed while the other waits.
 template <class Hardware, std::size_t count>
 struct LanePack {
   using Vector = typename Hardware::Vector;
@@ -105,7 +105,7 @@ struct MomentaOfStep {
   void end(std::size_t row, const PlanarVector<Pack>& v) { after.add(row, v); }
 };
 
-/// pefrl_step() of all lanes of the LanePack `Pack`. `Constant`: double if shared, else Pack.
+/// pefrl_step() of all lanes. `Pack` is a LanePack; `Constant` is Pack or, if shared, double.
 template <class Pack, class Constant>
 void step_packs(const ChainTables<Constant>& chain, const PefrlArrays& arrays) {
   const auto packs = [](double* numbers) { return reinterpret_cast<Pack*>(numbers); };
@@ -154,7 +154,7 @@ class CollocationStep {
         stage_q_(packs(arrays.stage_q)),
         stage_a_(packs(arrays.stage_a)) {}
 
-  // The functions of LaneKernel. The prediction uses the mean acceleration of the previous step.
+  // Functions of LaneKernel. prepare() predicts from the mean acceleration of the previous step.
   inline void prepare() const;
   inline void iterate() const;
   inline void finish() const;

@@ -46,14 +46,14 @@ class LaneMemory {
   /// Returns a new array of zeros, which lives as long as this object.
   double* zeros(std::size_t entries);
 
-  /// Writes the first entries of one lane.
+  /// Writes `values` to the first entries of a lane of `array`.
   void write(double* array, std::size_t lane, std::span<const double> values) const;
-  /// Reads the first entries of one lane.
+  /// Reads `values` from the first entries of a lane of `array`.
   void read(const double* array, std::size_t lane, std::span<double> values) const;
   /// Returns new tables with `chain` in every lane.
   LaneTables tables(const ChainTables<double>& chain);
   void write(const LaneTables& tables, std::size_t lane, const ChainTables<double>& chain) const;
-  /// Copies the first entries of one lane.
+  /// Copies the first `entries` entries of a lane.
   void copy(const double* from, double* to, std::size_t lane, std::size_t entries) const;
 
  private:
@@ -64,7 +64,7 @@ class LaneMemory {
   std::vector<std::unique_ptr<Line[]>> arrays_;
 };
 
-/// Arrays of a LaneMemory for one PEFRL step. A vector has 2 rows entries.
+/// Arrays of a LaneMemory for one PEFRL step. A vector has 2 * rows entries.
 struct PefrlArrays {
   double* state;  ///< vectors q and v
   double* next;   ///< vectors q and v at the end of the step

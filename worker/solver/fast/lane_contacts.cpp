@@ -20,11 +20,11 @@ using Sink = std::function<void(Outcome&&)>;
 
 /// Maximum number of cases that share a contact until its first compression ends.
 constexpr std::size_t kLargestGroup = 16;
-/// In a shorter fraction of a step, as near an event, the mean of a reaction is mostly rounding
-/// error. It is not used.
+/// The mean of a reaction over less than this fraction of a step, as near an event, is not used,
+/// because it is mostly rounding error.
 constexpr double kShortestSpan = 1e-3;
 
-/// A contact under way, with the other data for its result.
+/// A contact that is being solved, and other data that its result needs.
 struct Progress {
   Contact contact;
   TipState touch;
@@ -36,7 +36,7 @@ struct Lane {
   std::optional<Progress> progress;  ///< empty if the lane is idle
   ContactCase contact_case{};
   std::optional<ExplicitMotion> motion;
-  std::vector<ContactCase> followers;  ///< rest of the group, until the first compression ends
+  std::vector<ContactCase> followers;  ///< other cases that share the first compression
   Clock::time_point started{};
 };
 
@@ -85,7 +85,7 @@ class ContactLanes {
   }
 
  private:
-  /// Starts a branch, or else the next case, in an idle lane.
+  /// Starts a case in an idle lane: a branch if there is one, else the next case of the source.
   void fill(std::size_t lane) {
     if (!branches_.empty()) {
       Branch branch = std::move(branches_.front());
@@ -114,7 +114,7 @@ class ContactLanes {
     }
   }
 
-  /// Sets upcoming_ to the next case; false at the end.
+  /// Sets upcoming_ to the next case. Returns false if the source has no more cases.
   bool peek() {
     if (!upcoming_ && !is_exhausted_) {
       upcoming_ = source_();
@@ -148,7 +148,7 @@ class ContactLanes {
     } catch (const SolveError& error) {
       end(lane, std::nullopt, error.what());
       for (const ContactCase& follower : std::exchange(slot.followers, {})) {
-        sink_({follower.number, std::nullopt, error.what()});  // would fail in the same way
+        sink_({follower.number, std::nullopt, error.what()});  // its contact is the same so far
       }
       return false;
     }
@@ -205,7 +205,7 @@ class ContactLanes {
     }
   }
 
-  /// Frees the lane first: the sink may drop the chain.
+  /// Frees the lane before it calls the sink, because the sink may delete the chain.
   void end(std::size_t lane, std::optional<CaseResult>&& result, std::string error) {
     lanes_[lane].progress.reset();
     stepper_.idle(lane);
@@ -234,7 +234,7 @@ class ContactLanes {
   LaneStepper stepper_;
   std::vector<Lane> lanes_;
   std::size_t busy_ = 0;                 ///< number of lanes that are not idle
-  std::deque<Branch> branches_;          ///< start before further cases
+  std::deque<Branch> branches_;          ///< started before further cases of the source
   std::optional<ContactCase> upcoming_;  ///< next case of the source
   bool is_exhausted_ = false;            ///< the source has no further cases
   std::vector<unsigned char> accept_;

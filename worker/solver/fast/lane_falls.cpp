@@ -20,7 +20,7 @@ constexpr std::size_t kStages = GaussCollocation::kStages;
 /// Maximum size of the states that a fall keeps: 16 MB. With fewer states, finding the state at a
 /// drop takes long compared to a contact; with more, memory holds fewer falls.
 constexpr std::size_t kMaxOfStates = (std::size_t{16} << 20) / sizeof(double);
-/// Unresolved speed of a step, relative to accuracy times sqrt(g length) (collocation.md).
+/// Allowed unresolved speed of a step, relative to accuracy times sqrt(g length) (collocation.md).
 constexpr double kUnresolved = 1.5;
 /// First step, relative to sqrt(length/g).
 constexpr double kFirstStep = 1.0 / 4000.0;
@@ -30,7 +30,7 @@ constexpr double kLongestStep = 1.0 / 100.0;
 constexpr double kPositionError = 1e-8;
 constexpr double kSmallestPositionError = 1e-15;
 constexpr std::size_t kMaxSteps = 2'000'000;
-constexpr int kMaxHalvings = 30;  ///< consecutive halvings of one step
+constexpr int kMaxHalvings = 30;  ///< maximum number of consecutive halvings of a step
 
 /// Solves falls side by side; a lane whose fall is complete takes the next request. `Lanes` is
 /// SteppedLanes or CollocationFalls. An exception of start() or judge() becomes the fall's error.
@@ -123,7 +123,7 @@ class SteppedLanes {
 
   LaneStepper stepper_;
   std::vector<std::shared_ptr<SteppedFall>> falls_;
-  std::vector<unsigned char> all_;  ///< for settle(): accepts each step in every lane
+  std::vector<unsigned char> all_;  ///< 1 for every lane: settle() accepts all steps
   ChainState column_;
 };
 
@@ -304,7 +304,7 @@ class CollocationFall : public Fall {
   std::vector<std::vector<double>> states_;  ///< position, rates, mean acceleration
 };
 
-/// Chooses the step length, with few small changes: only constant steps are symplectic.
+/// Chooses the step length. Changes it seldom and little: only constant steps are symplectic.
 class StepControl {
  public:
   StepControl(double length_m, double gravity_m_s2, double accuracy)

@@ -11,13 +11,13 @@
 
 namespace oblique::solver {
 
-/// For a smaller tolerance explicit steps are faster than collocation (collocation.md).
+/// Smallest tolerance at which collocation can be faster than explicit steps (collocation.md).
 inline constexpr double kTightestCollocation = 3e-6;
 
 /// A fall to solve. The chain must outlive it. `progress` is used only during the solution.
 struct FallRequest {
   const Chain* chain;
-  std::shared_ptr<const Motion> motion;  ///< explicit motion of the chain
+  std::shared_ptr<const Motion> motion;  ///< motion of the chain by the explicit integrator
   double dt_s;                           ///< explicit step
   double accuracy;                       ///< allowed relative error of outputs of the contact
   FallProgress* progress = nullptr;

@@ -19,8 +19,8 @@ class LaneStepper {
 
   std::size_t lanes() const { return memory_.lanes(); }
 
-  /// Puts a state (q and v, 2 rows entries each) of `chain` into a lane. The arrays of `chain` must
-  /// live until the lane is loaded again or idle.
+  /// Puts a state (q and v, 2 * rows entries each) of `chain` into a lane. The arrays of `chain`
+  /// must live until the lane is loaded again or idle.
   void load(std::size_t lane, const ChainTables<double>& chain, const double* q, const double* v);
   /// Gives the lane a step length of 0.
   void idle(std::size_t lane);
@@ -32,7 +32,7 @@ class LaneStepper {
 
   /// Steps every lane from its accepted state to a trial state.
   void step();
-  /// The tip after that step.
+  /// The tip in the trial state.
   TipState trial_tip(std::size_t lane) const {
     const double* x = arrays_.next + 2 * tip_row_ * lanes() + lane;
     const double* vx = x + vector_ * lanes();

@@ -13,7 +13,7 @@ struct Peak {
   double t_s;   ///< since touch
   double fn_N;  ///< normal force at t_s
   double ft_N;  ///< largest |F_t| between the valleys of F_n on either side
-  bool major;   ///< remains when ripples are merged
+  bool major;   ///< not removed as a ripple of F_n
 };
 
 /// A local maximum of |F_t|.
@@ -103,10 +103,10 @@ struct CaseResult {
   double slide_m;  ///< path length of P
   double vt_out_m_s;
   double vn_out_m_s;
-  std::string mode;        ///< order of states, as "SC SR sR sC sR"
-  std::string major_mode;  ///< mode with ripples merged
-  /// Distance from another order of events, dimensionless, >= 0; near 0 the mode is unreliable. The
-  /// next member is the event that nearly changed the order.
+  std::string mode;        ///< states in order of time, such as "SC SR sR sC sR"
+  std::string major_mode;  ///< mode without the ripples of F_n
+  /// Smallest distance from a change in the order of events, dimensionless, >= 0; near 0 the mode
+  /// is unreliable. margin_event is the event that nearly changed the order.
   std::optional<double> margin;
   std::optional<std::string> margin_event;
   double stick_total_s;
@@ -122,7 +122,7 @@ struct CaseResult {
 struct Outcome {
   std::uint64_t number;  ///< the caller's number of the point
   std::optional<CaseResult> result;
-  std::string error;  ///< a sentence; empty with a result
+  std::string error;  ///< sentence that says why there is no result; else empty
 };
 
 }  // namespace oblique::solver

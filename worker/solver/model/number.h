@@ -7,8 +7,8 @@
 
 namespace oblique::solver {
 
-/// Returns the shortest text that reads back as the same bits, for files: 0.1, 1e-06, -0, nan. From
-/// 0.0001 up to a million the text has no exponent. Elsewhere it has none if that is as short.
+/// Returns the shortest text that reads back as the same bits, for files: 0.1, 1e-06, -0, nan.
+/// Numbers from 0.0001 up to a million have no exponent, others only if it shortens the text.
 std::string exact_number(double value);
 
 /// Longest text of `exact_number` [bytes].

@@ -133,14 +133,14 @@ std::string outside_usual(const ParameterKey& key, double value) {
          short_number(key.usual.from) + " to " + with_unit(key, key.usual.to);
 }
 
-/// The value times a power of 1000 that is in the usual range and nearest to its middle. Nothing
-/// for a key without a unit.
+/// Returns `value` times the power of 1000 that brings it nearest to the middle of the usual range,
+/// if the product is in this range and the key has a unit.
 std::optional<double> in_another_unit(const ParameterKey& key, double value) {
   const auto& [from, to] = key.usual;
   const double middle = std::sqrt(from * to);
   std::optional<double> best;
   for (int power = -12; power <= 12 && !key.unit.empty(); power += 3) {
-    // Division by a power of ten rounds once, multiplication by a negative one twice.
+    // Dividing by 10^n rounds once. Multiplying by 10^-n, which is not exact, rounds twice.
     const double other = power < 0 ? value / std::pow(10.0, -power) : value * std::pow(10.0, power);
     if (other >= from && other <= to &&
         (!best || std::abs(std::log(other / middle)) < std::abs(std::log(*best / middle)))) {
@@ -277,7 +277,7 @@ bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
   ModelParameters one = model;
   ModelParameters other = model;
   key.set(one, 1.0);
-  key.set(other, 2.0);  // differs from 1 even for a key that rounds its values
+  key.set(other, 2.0);  // differs from 1 even for a key whose values are rounded to integers
   return !(fall_model(one) == fall_model(other));
 }
 

@@ -31,9 +31,9 @@ struct ModelParameters {
   double tip_mass_kg = 0.0;  ///< point mass carried by the tip node
   Integrator integrator = Integrator::kExplicit;
   double spectral_radius = 0.9;  ///< of generalized-alpha at infinite frequency
-  double dt_s = 0.0;             ///< step in contact; 0: chosen by the tolerance
-  double dt_fall_s = 0.0;        ///< step in the fall; 0: chosen for the integrator
-  double tolerance = 1e-5;       ///< relative error that chosen steps leave in the outputs
+  double dt_s = 0.0;             ///< step in contact; if 0, the tolerance determines it
+  double dt_fall_s = 0.0;        ///< step in the fall; if 0, it is chosen for the integrator
+  double tolerance = 1e-5;       ///< relative error of outputs that chosen steps may cause
   double step_factor = 1.0;      ///< factor on the step in contact; 1 except in companion_model()
 
   bool operator==(const ModelParameters&) const = default;
@@ -95,12 +95,12 @@ Integrator integrator_named(std::string_view name);
 /// Returns the names in the order of the enumerators.
 std::span<const std::string_view> integrator_names();
 
-/// The model of the preset `standard`, `paper`, `printed` or `converged`. Else throws InputError.
+/// Returns the preset `standard`, `paper`, `printed` or `converged`; throws InputError for others.
 ModelParameters preset(std::string_view name);
 /// The default preset comes first.
 std::span<const std::string_view> preset_names();
 
-/// Mean differences between results on a mesh and on 48 elements a link, 400 random points [%].
+/// Mean differences of results of 400 random points between a mesh and 48 elements per link [%].
 struct MeshAccuracy {
   int elements_per_link;
   double forces_off;

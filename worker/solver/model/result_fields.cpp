@@ -40,7 +40,7 @@ T& created(std::optional<T>& member) {
   return member ? *member : member.emplace();
 }
 
-/// The member of a CaseResult, or of a member of it, at the end of this path.
+/// The member that the path `steps` of nested members reaches from a CaseResult.
 template <auto... steps>
 constexpr auto at = [] {
   using Kept = std::remove_cvref_t<decltype((std::declval<CaseResult&>().*....*steps))>;
@@ -70,7 +70,7 @@ Cell cell(PhaseKind kind) {
   return phase_kind_name(kind);
 }
 
-/// Passes these members of each element of a list to `take`.
+/// For each element of `list`, calls `take` with the `members` of the element.
 template <auto list, auto... members>
 void each_of(const CaseResult& result, const TakeElement& take) {
   for (const auto& element : result.*list) {
@@ -83,7 +83,7 @@ using Result = CaseResult;
 using Energy = ContactEnergy;
 using Errors = ErrorEstimate;
 
-/// A list whose column and values have the names of the members.
+/// A ResultList. Its column has the name of `list`, its values have the names of `members`.
 template <auto list, auto... members>
 constexpr ResultList list_of(std::string_view unit, std::string_view meaning,
                              bool has_names = true) {

@@ -16,7 +16,7 @@ template <class T>
 struct Member {
   using Value = T;
   const T* (*of)(const CaseResult& result);  ///< null if the member is absent
-  T& (*in)(CaseResult& result);  ///< creates the member; null for a member that a list determines
+  T& (*in)(CaseResult& result);  ///< creates the member; null if the value is taken from a list
   bool may_be_absent = false;
 };
 
@@ -52,9 +52,9 @@ enum class SentWith {
 
 /// One output of a solved point.
 struct ResultField {
-  std::string_view name;           ///< in `solve --json`, inside `group`
-  std::string_view group = {};     ///< object of `solve --json` that contains it; or empty
-  std::string_view column = name;  ///< of the view `runs` and of queries
+  std::string_view name;           ///< name of the output in `solve --json`
+  std::string_view group = {};     ///< object of `solve --json` that contains the output; or empty
+  std::string_view column = name;  ///< name of the column in the view `runs` and in queries
   std::string_view unit = {};      ///< SI; empty for pure numbers and texts
   std::string_view meaning = {};   ///< in one line; says which direction is positive
   std::variant<Member<double>, Member<std::int64_t>, Member<std::string>, ListPart> value;

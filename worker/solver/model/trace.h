@@ -48,7 +48,7 @@ struct Tracing {
   using Sink = std::function<void(const TraceRow&)>;
   Sink sink;  ///< called at every accepted step, from touch to separation; may be empty
   bool with_shape = false;  ///< fill TraceRow::nodes_m
-  bool with_fall = false;   ///< first call `sink` at kFallRows instants of the fall
+  bool with_fall = false;   ///< first pass kFallRows instants of the fall to `sink`
 };
 
 }  // namespace oblique::solver

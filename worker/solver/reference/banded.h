@@ -172,7 +172,7 @@ class BandedLu {
   /// Number of columns right of the diagonal that row exchanges can fill.
   static constexpr std::size_t kReach = 2 * bandwidth;
 
-  // Row i holds columns i - bandwidth .. i + 2 bandwidth, and room for one exchange.
+  // Row i contains columns i - bandwidth .. i + kReach; row exchanges fill the last `bandwidth`.
   double& entry(std::size_t i, std::size_t j) { return rows_[i][j + bandwidth - i]; }
   double entry(std::size_t i, std::size_t j) const { return rows_[i][j + bandwidth - i]; }
 

@@ -26,8 +26,8 @@ struct LinkBalance {
   Constant weight_beyond_N;  ///< weight of the link and all links outside it
 };
 
-/// Pointers to the tables of a Chain or of LaneTables. Elements of a link have one length, so
-/// weights and momenta of the slopes between them are zero.
+/// Pointers to the tables of a Chain or of LaneTables. Elements of a link have equal lengths, so
+/// the slopes at the nodes between them have no weight or momentum.
 template <class Constant>
 struct ChainTables {
   std::size_t rows;
@@ -35,7 +35,7 @@ struct ChainTables {
   std::size_t links;
   std::size_t elements_per_link;
   const ElementConstants<Constant>* link;  ///< by link
-  const FactorRow<Constant>* mass_factor;  ///< `rows`, and kHalfBandwidth more of zeros
+  const FactorRow<Constant>* mass_factor;  ///< `rows` rows, then kHalfBandwidth rows of zeros
   const Constant* weight_N;                ///< generalised gravity along y, by row
   const Constant* momentum_kg;             ///< momentum per rate, by row
   const LinkBalance<Constant>* balance;    ///< by link
@@ -97,7 +97,7 @@ class ForwardSubstitution {
 };
 
 /// Solves D Lᵀ z = y from row `rows` - 1 down to `first`. Calls `take(row, x, y)` with z in each
-/// row. `factor` has `rows` rows and kHalfBandwidth more of zeros.
+/// row. `factor` has `rows` rows, followed by kHalfBandwidth rows of zeros.
 template <class Constant, class Real, class Take>
 inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows, std::size_t first,
                             const Real* y, const Take& take) {
@@ -128,7 +128,7 @@ inline void substitute_back(const FactorRow<Constant>* factor, std::size_t rows,
 }
 
 /// Eqs. 9 to 13: y = L^-1 (Q_gravity + S_tipᵀ F - dU/dq), forces and substitution in one pass along
-/// the chain. `q` and `y` have 2 rows entries. The pin's row of `y` has no meaning.
+/// the chain. `q` and `y` have 2 * rows entries. The pin's row of `y` has no meaning.
 template <class Constant, class Real>
 inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q, const Real& ft_N,
                               const Real& fn_N, Real* y) {
@@ -139,7 +139,7 @@ inline void substitute_forces(const ChainTables<Constant>& chain, const Real* q,
     y[2 * row] = y_row.x;
     y[2 * row + 1] = y_row.y;
   };
-  std::size_t row = 0;      // of the position at the element's left end
+  std::size_t row = 0;      // row of the position at the element's left end
   Vector pull_from_left{};  // sum of the forces of the elements on the left, on the row of p
   for (std::size_t link = 0; link < chain.links; ++link) {
     const ElementConstants<Constant>& constants = chain.link[link];
@@ -176,7 +176,7 @@ inline void substitute_accelerations(const ChainTables<Constant>& chain, const R
 }
 
 /// Eq. 13, joints eliminated: q'' = M^-1 (Q_gravity + S_tipᵀ F - dU/dq). `q` and `acceleration`
-/// have 2 rows entries.
+/// have 2 * rows entries.
 template <class Constant, class Real>
 inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* q, const Real& ft_N,
                                 const Real& fn_N, Real* acceleration) {
@@ -193,7 +193,7 @@ inline void chain_accelerations(const ChainTables<Constant>& chain, const Real* 
 template <class Constant, class Real>
 class LinkMomenta {
  public:
-  /// Writes 2 links entries of `momenta_Ns`.
+  /// Writes two entries per link to `momenta_Ns`.
   LinkMomenta(const ChainTables<Constant>& chain, Real* momenta_Ns)
       : chain_(chain),
         momenta_Ns_(momenta_Ns),

@@ -16,7 +16,7 @@ namespace oblique::solver {
 class Contact {
  public:
   static constexpr double kLongest_s = 20e-3;
-  static constexpr std::int64_t kMaxSteps = 5'000'000;  ///< ten thousand times the usual number
+  static constexpr std::int64_t kMaxSteps = 5'000'000;  ///< 10,000 times the usual number of steps
 
   Contact(const ContactParameters& parameters, const TipState& touch, const ContactSteps& steps);
 
@@ -53,7 +53,7 @@ class Contact {
     double low_s = 0.0;    ///< phi is negative here
     double high_s = 0.0;   ///< phi is not negative here
     double slope = 0.0;    ///< d phi / dt near the crossing
-    double last_s = -1.0;  ///< last trial; negative before the first
+    double last_s = -1.0;  ///< time of the last trial; negative before the first trial
     double last_value = 0.0;
     double full_s = 0.0;   ///< length of the step that passed the event
     double guess_s = 0.0;  ///< zero of the polynomial

@@ -25,7 +25,7 @@ struct Cubic {
     if (!(discriminant > 0.0)) {
       return {1.0, 1.0, 1.0};
     }
-    // The roots q/a and a1/q have no cancellation. NaN and infinity are not inside.
+    // q/a and a1/q are the roots without cancellation. inside() returns 1 for NaN and infinity.
     const double q = -0.5 * (b + std::copysign(std::sqrt(discriminant), b));
     const auto inside = [](double z) { return z > 0.0 && z < 1.0 ? z : 1.0; };
     const auto [first, second] = std::minmax({inside(q / a), inside(a1 / q)});
@@ -33,8 +33,8 @@ struct Cubic {
   }
 };
 
-/// Root of a monotone function that rises through zero in [low, high]: Newton's method, and
-/// bisection where it leaves the bracket.
+/// Returns the root of a monotone function that rises through zero in [low, high]. Uses Newton's
+/// method, and bisection when a Newton step leaves the bracket.
 double rising_root(const Cubic& phi, double low, double high) {
   double z = 0.5 * (low + high);
   for (int i = 0; i < 60 && high - low > 1e-15; ++i) {

@@ -7,8 +7,8 @@
 
 namespace oblique::solver {
 
-/// An event that may end a regime. Events within kSimultaneous_s of each other happen in this
-/// order, because the first may cancel a later one.
+/// An event that may end a regime. Of events within kSimultaneous_s of each other, the one listed
+/// first happens first, because it may cancel a later one.
 enum class ContactEvent {
   kSeparation,          ///< eq. 25, restitution: F_n falls to 0
   kTurn,                ///< eq. 22, V_n changes sign: compression <-> restitution
@@ -77,7 +77,7 @@ inline TipState displacement(const TipState& start, const TipState& end) {
 struct EventGuess {
   ContactEvent event;
   double fraction;       ///< of the step
-  double slope;          ///< d phi / d fraction there
+  double slope;          ///< d phi / d fraction at `fraction`
   bool inside_only;      ///< phi is negative at both ends of the step
   double peak_fraction;  ///< maximum of the polynomial; valid with inside_only
 };

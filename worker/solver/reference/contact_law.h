@@ -86,7 +86,7 @@ class ContactLaw {
   ContactParameters parameters_;
   double tangential_stiffness_N_m_;
   PhaseKind phase_{};
-  double normal_stiffness_N_m_{};  ///< in the present phase
+  double normal_stiffness_N_m_{};  ///< k_n of the present phase
   double slip_coupling_{};         ///< mu eta2 k_n/k: speed of P in slip per V_n
   bool stick_;
   double s_;

@@ -99,7 +99,7 @@ std::string ContactRecord::mode(const std::vector<bool>& survives) const {
   std::string text;
   std::string last;
   for (const State& state : states_) {
-    // Each turn that is left after merging ripples switches between compression and restitution.
+    // Each turn that is not part of a ripple switches between compression and restitution.
     bool compression = true;
     for (std::size_t i = 0; i < turns_.size() && turns_[i].t_s <= state.t0_s; ++i) {
       compression = survives[i] ? !compression : compression;
@@ -167,8 +167,8 @@ ContactMargin::ContactMargin(const ContactLaw& law, const TipState& touch)
 }
 
 void ContactMargin::add_speed(double distance_m_s, std::string_view event) {
-  // Within a step a function may be nearer to zero than at its ends, by this part of the touch
-  // speed.
+  // Within a step a function may come nearer to zero than at the ends of the step. kInside is the
+  // difference, relative to the speed at touch.
   constexpr double kInside = 0.005;
   speed_m_s_.add(distance_m_s, event);
   near_m_s_ = -(speed_m_s_.distance + kInside * touch_speed_m_s_);
@@ -211,7 +211,7 @@ void ContactMargin::add_event(const ContactLaw& before, ContactEvent event, cons
   const bool is_stick = event == ContactEvent::kStick;
   const bool is_separation = event == ContactEvent::kSeparation;
   if (event == ContactEvent::kTangentialExtremum || (is_stick && before.mu() == 0.0)) {
-    return;  // the state does not change: without friction P reverses
+    return;  // no change of state; without friction P reverses instead of sticking
   }
   const double s = before.slip_direction();
   if (!is_turn && !is_separation && turn_.rises) {
@@ -270,7 +270,7 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
   ReactionPeak peak{last_.middle_s, std::sqrt(reaction.last_N2)};
   const double right = (std::sqrt(next_N2) - peak.force_N) / (next.middle_s - last_.middle_s);
   if (reaction.before_N2 < 0.0) {
-    // A reaction that falls from the start is extrapolated linearly to the start.
+    // If a reaction falls from the start, its peak is there and is extrapolated linearly.
     const double back_s = right <= 0.0 ? 0.5 * last_.width_s : 0.0;
     peak = {last_.middle_s - back_s, peak.force_N - right * back_s};
   } else {
@@ -295,7 +295,7 @@ void ReactionPeaks::add_maximum(Reaction& reaction, const Span& next, double nex
 std::vector<ReactionPeak> ReactionPeaks::peaks() const {
   std::vector<ReactionPeak> peaks;
   for (const Reaction& reaction : reactions_) {
-    // A reaction that rises at the end is extrapolated linearly to the end.
+    // If a reaction rises at the end, its peak is there and is extrapolated linearly.
     ReactionPeak end{last_.middle_s, std::sqrt(std::max(reaction.last_N2, 0.0))};
     if (reaction.before_N2 >= 0.0 && reaction.last_N2 >= reaction.before_N2) {
       const double rise_N_s =

@@ -58,7 +58,7 @@ class ContactRecord {
   std::vector<State> states_;
   double ft_span_N_ = 0.0;
   double xP_m_;            ///< P at the start of the present regime
-  double work_n_J_ = 0.0;  ///< done on the finger
+  double work_n_J_ = 0.0;  ///< work done on the finger by F_n
   double work_t_J_ = 0.0;
 };
 
@@ -67,7 +67,7 @@ class ContactRecord {
 /// peak. The ripple with the smallest difference is merged first.
 std::vector<bool> without_ripples(const std::vector<double>& fn_N);
 
-/// The margin of a contact: its smallest distance from another order of events (theory.md).
+/// The margin of a contact: its smallest distance from a change in the order of events (theory.md).
 class ContactMargin {
  public:
   struct Nearest {
@@ -104,7 +104,7 @@ class ContactMargin {
     double path_m;
     double h_s;
 
-    /// Rates at the start and the end, times h^2.
+    /// Rates of change at the start and the end of the step, times h_s^2.
     double rise0() const { return 6.0 * path_m - h_s * (4.0 * first_m_s + 2.0 * last_m_s); }
     double rise1() const { return h_s * (2.0 * first_m_s + 4.0 * last_m_s) - 6.0 * path_m; }
     bool has_extremum() const { return rise0() * rise1() < 0.0; }
@@ -113,7 +113,7 @@ class ContactMargin {
     }
     double path_while_positive_m() const;
   };
-  /// A function of velocities that is negative in a regime and zero at the event.
+  /// A function of velocities that is negative in a regime and zero at the event that ends it.
   struct Approach {
     bool is_near = true;   ///< at the end of the last step
     bool rises = false;    ///< at the end of the last step
@@ -171,8 +171,8 @@ class ReactionPeaks {
   explicit ReactionPeaks(std::size_t reactions) : reactions_(reactions) {}
 
   /// Adds the next span: its end, its length (0 for an instant), and the squared magnitude of each
-  /// reaction's mean. These are `stride` numbers apart. A second span at the same time, after an
-  /// event, is ignored.
+  /// reaction's mean. These magnitudes are `stride` numbers apart. A second span at the same time,
+  /// after an event, is ignored.
   void add(double end_s, double width_s, const double* squared_N2, std::size_t stride = 1) {
     const Span next{end_s - 0.5 * width_s, width_s};
     if (!(next.middle_s > last_.middle_s)) {
@@ -193,7 +193,7 @@ class ReactionPeaks {
     last_ = next;
   }
 
-  /// A reaction that rises up to its last span is extrapolated linearly to its end. If
+  /// A reaction that rises up to the last span is extrapolated linearly to the end of this span. If
   /// rises_at_end(), add the value at the end first, which is more accurate.
   std::vector<ReactionPeak> peaks() const;
   bool rises_at_end() const;

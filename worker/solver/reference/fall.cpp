@@ -11,7 +11,7 @@ namespace {
 
 /// When this many states are kept, every second one is dropped. A state has 32 bytes per row.
 constexpr std::size_t kMaxKept = 4096;
-constexpr double kMaxSteps = 1e9;  ///< maximum in the time sqrt(2 length/g); more take hours
+constexpr double kMaxSteps = 1e9;  ///< steps allowed in the time sqrt(2 length/g); more take hours
 
 }  // namespace
 
@@ -115,7 +115,7 @@ ChainState SteppedFall::state_at_drop(double H_m) const {
 
 ChainState SteppedFall::state_at_time(double t_s) const {
   auto last_step = static_cast<std::int64_t>(t_s / dt_s_);
-  last_step -= time_s(last_step) > t_s ? 1 : 0;  // the quotient was rounded up
+  last_step -= time_s(last_step) > t_s ? 1 : 0;  // if the quotient was rounded up
   const auto number =
       std::min<std::int64_t>(last_step / steps_kept_, static_cast<std::int64_t>(kept_.size()) - 1);
   ChainState state = kept_[static_cast<std::size_t>(number)];

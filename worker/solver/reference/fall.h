@@ -115,7 +115,7 @@ class SteppedFall : public Fall {
 std::shared_ptr<const Fall> solve_stepped_fall(const std::shared_ptr<const Motion>& motion,
                                                double dt_s, double longest_s,
                                                FallProgress* progress = nullptr);
-/// The same by the explicit integrator. `chain` must outlive the fall.
+/// Solves a fall in explicit steps of dt_s. `chain` must outlive the fall.
 std::shared_ptr<const Fall> solve_stepped_fall(const Chain& chain, double dt_s);
 
 }  // namespace oblique::solver

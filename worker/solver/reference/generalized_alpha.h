@@ -34,9 +34,9 @@ struct GeneralizedAlphaParameters {
 /// [c M + beta h^2 K, Phi_qᵀ; Phi_q, 0], c = (1 - alpha_m)/(1 - alpha_f), is regular as h -> 0.
 class GeneralizedAlphaMotion : public Motion {
  public:
-  /// Newton's method stops when a correction moves no position by more than this part of an
-  /// element's length and no slope by more than this. The remaining error is about the square of
-  /// this. Steps in contact take one iteration.
+  /// Newton's method stops when corrections of positions, relative to an element's length, and of
+  /// slopes are at most this tolerance. The remaining error is about the square of the tolerance.
+  /// Steps in contact take one iteration.
   static constexpr double kNewtonTolerance = 1e-6;
   static constexpr int kMaxIterations = 20;
 
@@ -47,7 +47,7 @@ class GeneralizedAlphaMotion : public Motion {
   ChainState at_rest() const override;
   TipState tip(const ChainState& state) const override { return chain_.tip(state); }
   Energies energies(const ChainState& state) const override { return chain_.energies(state); }
-  /// Throws SolveError when Newton does not converge.
+  /// Throws SolveError when Newton's method does not converge.
   ContactIntegrals<double> step(const ChainState& from, const AffineContactForce<double>& force,
                                 double h_s, ChainState& to) const override;
   void restart(const AffineContactForce<double>& force, ChainState& state) const override;

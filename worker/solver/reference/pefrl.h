@@ -29,7 +29,7 @@ struct UnwatchedStep {
   void end(std::size_t, const PlanarVector<Real>&) {}
 };
 
-/// Eqs. 13 and 15: steps q and v (2 chain.rows entries each) by h seconds into q_next and v_next,
+/// Eqs. 13 and 15: steps q and v (2 * chain.rows entries each) by h seconds into q_next and v_next,
 /// which may be q and v themselves. `scratch` has the same size. Calls watch.start(row, v) and
 /// later watch.end(row, v) with the rates at both ends of the step, for each row from the tip to
 /// the row after the pin. The rates are in registers then, so calls cost little.

@@ -17,7 +17,7 @@ namespace {
 /// Maximum error of the energy balance, relative to the exchanged energy. A larger error shows that
 /// the step does not resolve the contact.
 constexpr double kWorstClosure = 1e-2;
-/// Smallest exchanged energy, relative to the energies at touch, above their rounding errors.
+/// Smallest exchanged energy relative to the energies at touch; smaller ones are rounding errors.
 constexpr double kLeastExchanged = 1e-10;
 
 void balance(const Energies& in, const Energies& out, const ContactRecord& record,
@@ -73,7 +73,7 @@ TraceRow chain_row(const Motion& motion, const AffineContactForce<double>& force
 }
 
 TraceRow falling_row(const Motion& motion, ChainState& state, double touch_s, bool with_shape) {
-  motion.restart(kNoContact, state);  // makes reactions independent of the last step
+  motion.restart(kNoContact, state);  // so that reactions do not depend on the last step
   TraceRow row = chain_row(motion, kNoContact, state, with_shape);
   row.t_s = state.t_s - touch_s;
   row.xP_m = row.x_m;
