@@ -28,7 +28,7 @@ class TomlReader {
 
   const std::string& file() const { return file_; }
 
-  /// Parses the text of the file. Refuses keys with more than 100 parts, which dots separate.
+  /// Parses the text of the file. Refuses keys with more than 100 dotted parts.
   toml::table parse(std::string_view text) const;
 
   /// Throws an InputError with `message` and the place of the node or key `at`.

@@ -514,7 +514,7 @@ plot::Cells cells_of_regions(const FoundMap& map, const plot::Panel& panel) {
   return cells;
 }
 
-/// The values of --over around the points of the coarse grid.
+/// The cells of --over, one per point of the coarse grid.
 plot::Cells cells_of_numbers(const FoundMap& map) {
   const auto around_points = [&](const MapAxis& axis) {
     std::vector<double> values;

@@ -299,8 +299,8 @@ std::vector<double> lengths_of(const py::handle& value) {
 
 /// Reads a dict of numbers, texts (expressions), arrays of `points` values, and a list `lengths`.
 /// Throws InputError, with key, value and allowed range, for an unknown key (with the nearest known
-/// key), a wrong combination, and a value that is wrong for all points. A wrong value in an array
-/// becomes the error of its model or, when the point is solved, the error of the point.
+/// key), a wrong combination, and a value that is wrong for all points. If only some
+/// values of an array are wrong, the errors belong to their models or points.
 GivenPoints points_of(const py::dict& keys, std::size_t points) {
   protocol::ModelInput model;
   std::map<std::size_t, protocol::Axis> keyed_axes;

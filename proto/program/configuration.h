@@ -40,8 +40,8 @@ class Configuration {
   };
 
   std::string file_to_read() const;
-  // Set all options that have no value yet. Before each option they set `place` to the place of its
-  // value, for error messages.
+  // Both functions set the options that have no value yet. Before they set an option, `place`
+  // becomes the place of its value, for error messages.
   void set_from_environment(std::string& place) const;
   void set_from_file(std::string& place) const;
 

@@ -381,7 +381,7 @@ void check_values(const ParameterKey& key, const Axis& axis, BlockKind kind) {
           "expression",
           key.name);
   require(Spacing_IsValid(axis.spacing()) && (axis.count() > 0 || axis.spacing() == SPACING_LINEAR),
-          "{}: its spacing is unknown, or there is no range", key.name);
+          "{}: its spacing is unknown, or it has a spacing but no range", key.name);
   require(!axis.has_distribution() || kind == BlockKind::kSample,
           "{} has a distribution: only a sample draws from one; give the block `sample`", key.name);
   if (axis.count() > 0) {

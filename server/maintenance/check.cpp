@@ -195,7 +195,7 @@ class StudyCheck {
   Statement studies_;
   Statement rows_;
   Statement definition_;
-  // the last two models found to be equal: number in the recipe, and in the table `models`
+  // the last pair of equal models: number in the recipe, id in the table `models`
   std::pair<std::uint64_t, std::int64_t> equal_models_{0, -1};
   std::string name_;  // name of the current study
   std::vector<std::string> study_faults_;

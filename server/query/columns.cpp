@@ -165,7 +165,7 @@ std::vector<Column> columns_and_functions() {
     const std::string_view member = list->members.back() == "major" ? "fn_N" : list->members.back();
     columns.push_back(
         {fmt::format("{}[0].{}", list->column, member), unit_of_member(member), "element", "",
-         fmt::format("{} of the first element, or with [-1] of the last{}. Members: {}", member,
+         fmt::format("{} of the first element; [-1] is the last{}. Members: {}", member,
                      list->column == "peaks" ? "; ripples count too, and major_peak_1_N is the "
                                                "first major peak"
                                              : "",

@@ -155,7 +155,7 @@ class Scheduler {
     bool paused;
     bool finished;
     std::int32_t priority = 0;
-    /// Leased batches, counted from the value that `level` set. A long batch counts for several.
+    /// Leased batches plus the start value from `level`. A long batch counts for several.
     double served = 0.0;
     std::string solver_version{};  ///< solver version of results and leases; empty without them
     std::set<LeaseId> leases{};

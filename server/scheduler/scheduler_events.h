@@ -29,8 +29,8 @@ struct SchedulerSettings {
   double lanes_batch_s = 10.0;  ///< maximum duration of a batch enlarged to fill lanes with points
   double models_batch_s = 1.0;  ///< maximum duration of a batch enlarged to fill lanes with models
   std::uint64_t growth = 4;     ///< maximum growth factor from one batch of a worker to the next
-  /// Number of batches per thread that each new batch leaves for later. So batches shrink toward
-  /// the end of a study, and all workers finish together.
+  /// A batch has at most the free points per thread divided by this. So batches shrink toward the
+  /// end of a study, and all workers finish together.
   std::uint64_t tail_batches_per_thread = 3;
   double shortest_batch_s = 0.01;  ///< shorter batches cost too much in transport
   /// If no other points can be leased, a second worker also gets each batch that takes longer than
@@ -40,7 +40,7 @@ struct SchedulerSettings {
   double straggler_factor = 4.0;
   LossLimits loss_limits{};
   std::uint64_t suspect_parts = 8;  ///< number of parts into which suspect points are split
-  /// A failing point fails after this time, unless a process that was lost with it returns.
+  /// Failing points fail after this time, unless a process that was lost with them returns.
   std::int64_t return_within_ms = 10'000;
   /// For this time a risky point is reserved for the worker that has been proven longest.
   std::int64_t longest_proven_within_ms = 10'000;

@@ -95,7 +95,7 @@ void Scheduler::check_losses() const {
   for (const auto& [id, worker] : workers_) {
     const WorkerProcess& process = processes_.at(worker.process);
     require(process.workers.contains(id), "a worker is missing from its process");
-    require(worker.probe == 0 || worker.leases.empty(), "a probe is not alone");
+    require(worker.probe == 0 || worker.leases.empty(), "a probed worker has other leases");
     require(worker.leases.size() <= settings_.newcomer_batches + worker.solved_batches,
             "a worker holds more batches than its solved ones allow");
     require(worker.solved_batches == 0 || process.proven_since_ms,

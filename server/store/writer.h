@@ -94,7 +94,7 @@ class GroupCommit {
 
   /// Must be called at a start, to continue the deletion of rows of deleted studies.
   void resume_deletions() { clears_ = true; }
-  /// Returns whether rows of deleted studies may be left.
+  /// Returns whether rows of deleted studies may remain.
   bool has_to_clear() const { return clears_ && !gone_; }
   /// Deletes at most `most` rows of deleted studies. Returns false if the next call should wait.
   bool clear(std::size_t most, std::vector<WriteReport>& reports);

@@ -72,7 +72,7 @@ class Finger::Parts {
 
 namespace {
 
-/// Solves the points of `source`, of any fingers, and passes the outcomes to `sink`.
+/// Solves the points of `source`, whose fingers may differ. Passes the outcomes to `sink`.
 class PointSolver {
  public:
   PointSolver(const FingerPoints& source, const TakeOutcome& sink, const Tracing& tracing)

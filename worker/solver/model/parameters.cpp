@@ -179,7 +179,7 @@ void check_value(const ParameterKey& key, double value) {
 void validate(const ModelParameters& model) {
   if (model.lengths_m.empty() || model.lengths_m.size() > kMaxLinks) {
     throw InputError("lengths", "lengths has " + std::to_string(model.lengths_m.size()) +
-                                    " values: it must have one a link, from 1 to " +
+                                    " values: it must have one per link, from 1 to " +
                                     std::to_string(kMaxLinks));
   }
   for (const double length_m : model.lengths_m) {

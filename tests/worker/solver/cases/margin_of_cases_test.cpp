@@ -52,7 +52,7 @@ TEST(Margin, FallsLinearlyToZeroOnBothSidesOfAChangeOfMode) {
       const CaseResult far = solved(change, mu * (1.0 + side * 2.0 * kNear));
       EXPECT_EQ(*near.margin_event, side < 0.0 ? change.below : change.above);
       EXPECT_EQ(*far.margin_event, *near.margin_event);
-      // The margin has the order of magnitude of the relative distance between mu and the change.
+      // The margin has the order of magnitude of mu's relative distance from the change.
       EXPECT_GT(*near.margin, 0.03 * kNear);
       EXPECT_LT(*near.margin, 3.0 * kNear);
       EXPECT_NEAR(*far.margin / *near.margin, 2.0, 0.2);
