@@ -353,7 +353,7 @@ solver::ModelParameters model_of(const protocol::TomlReader& file, const toml::n
       } else if (name == protocol::ModelInput::kLengths) {
         ParameterKey key = protocol::model_key("length");
         key.name = name;
-        constexpr std::string_view kForm = "a list of lengths in m, one per link";
+        constexpr std::string_view kForm = "a list of numbers, the lengths in m, one per link";
         if (!value.is_array()) {
           file.fail(value, fmt::format("lengths = {} is not allowed: it must be {}",
                                        protocol::shown(value), kForm));
