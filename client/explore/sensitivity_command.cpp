@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "client/study/point_flags.h"
 #include "client/trace/solve_again.h"
 #include "proto/recipe/model_message.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::client {
 namespace {
