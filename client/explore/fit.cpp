@@ -96,6 +96,12 @@ VectorXd parameters_at(const FitProblem& problem, const VectorXd& angles) {
   return values;
 }
 
+VectorXd residuals_of(const FitProblem& problem, const VectorXd& predictions) {
+  return ((predictions - problem.measured).array() / problem.sd.array()).unaryExpr([](double r) {
+    return std::isfinite(r) ? r : kMissing;
+  });
+}
+
 /// The model with derivatives at several vectors of angles, by one call of `evaluate`.
 std::vector<FitStep> steps_at(const FitProblem& problem, std::vector<VectorXd> places,
                               const std::string& what) {
@@ -118,8 +124,7 @@ std::vector<FitStep> steps_at(const FitProblem& problem, std::vector<VectorXd> p
     step.angles = places[p];
     step.parameters = points[at];
     step.predictions = predictions.at(at++);
-    step.residuals = ((step.predictions - problem.measured).array() / problem.sd.array())
-                         .unaryExpr([](double r) { return std::isfinite(r) ? r : kMissing; });
+    step.residuals = residuals_of(problem, step.predictions);
     step.chi2 = step.residuals.squaredNorm();
     step.jacobian.resize(step.residuals.size(), step.angles.size());
     for (Index i = 0; i < step.angles.size(); ++i, at += 2) {
@@ -151,13 +156,18 @@ VectorXd damped_step(const MatrixXd& jacobian, const VectorXd& residuals,
 VectorXd best_start(const FitProblem& problem) {
   constexpr std::uint64_t kPlaces = 16;
   std::vector<VectorXd> places(kPlaces, problem.start());
-  for (std::uint64_t p = 1; p < kPlaces; ++p) {
-    for (Index i = 0; i < places[p].size(); ++i) {
+  std::vector<VectorXd> points;
+  for (std::uint64_t p = 0; p < kPlaces; ++p) {
+    for (Index i = 0; p > 0 && i < places[p].size(); ++i) {
       const auto bits = sampling::sobol_bits(p, static_cast<std::uint32_t>(i));
       places[p][i] = angle_at(std::ldexp(static_cast<double>(bits), -sampling::kSobolBits));
     }
+    points.push_back(parameters_at(problem, places[p]));
   }
-  return std::ranges::min(steps_at(problem, places, "starts"), {}, &FitStep::chi2).angles;
+  const auto predictions = problem.evaluate(points, "starts");
+  const auto best = std::ranges::min_element(
+      predictions, {}, [&](const VectorXd& at) { return residuals_of(problem, at).squaredNorm(); });
+  return places[static_cast<std::size_t>(best - predictions.begin())];
 }
 
 }  // namespace

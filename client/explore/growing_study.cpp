@@ -74,7 +74,10 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
     where.key = service_->client_key();
     where.if_silent = why_silent(settings.database);
   }
-  connection_ = std::make_unique<Connection>(where, [this] { return keep_waiting(); });
+  connection_ = std::make_unique<Connection>(where, [this] {
+    report_service();
+    return !stop_.requested();
+  });
   *recipe_.mutable_model() = protocol::to_message(model);
   const auto found = connection_->query(
       fmt::format("SELECT 1 FROM studies WHERE name = {}", server::sql_text(name_)));
@@ -92,14 +95,13 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
 
 GrowingStudy::~GrowingStudy() = default;
 
-bool GrowingStudy::keep_waiting() {
+void GrowingStudy::report_service() {
   if (service_) {
     service_->check();
     if (const auto news = service_->news(); !news.empty()) {
       console_.notes() << protocol::visible_lines(news) << '\n';
     }
   }
-  return !stop_.requested();
 }
 
 void GrowingStudy::submit(const protocol::Recipe& recipe) {
@@ -121,7 +123,7 @@ void GrowingStudy::submit(const protocol::Recipe& recipe) {
 void GrowingStudy::wait(const std::string& what) {
   FollowedStudy followed(*connection_, name_);
   const auto ask = [&](const Tell& tell) {
-    keep_waiting();
+    report_service();
     auto status = followed.status(tell);
     if (const auto reason = objection_to_waiting(status); service_ && !reason.empty()) {
       throw std::runtime_error(reason);

@@ -66,7 +66,8 @@ class GrowingStudy {
   std::uint64_t points() const { return points_; }  ///< number of points in all rounds so far
 
  private:
-  bool keep_waiting();
+  /// Prints news of the embedded server and its workers. Throws if one of them has ended.
+  void report_service();
   void submit(const protocol::Recipe& recipe);
   void wait(const std::string& what);
 

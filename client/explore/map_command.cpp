@@ -86,8 +86,8 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
   const auto from = solver::number_of(ends.front());
   const auto to = solver::number_of(ends.back());
   if (parts.size() != 2 || ends.size() != 2 || !from || !to) {
-    throw InputError(fmt::format("{} is required as KEY=FROM:TO, for example mu=0.05:2; got \"{}\"",
-                                 flag, text));
+    throw InputError(
+        fmt::format("{} must be KEY=FROM:TO, for example mu=0.05:2; got \"{}\"", flag, text));
   }
   const auto& key = protocol::axis_key(parts.front());
   protocol::check_ends(key, *from, *to);
@@ -358,6 +358,19 @@ std::string islands_sentence(const FoundMap& map) {
       size(map.plane.axes[0]), size(map.plane.axes[1]));
 }
 
+std::string shifts_sentence(const FoundMap& map) {
+  CurveShift all{.largest = 0.0};
+  for (const auto& shift : map.shifts) {
+    all.checked += shift.checked;
+    all.lost += shift.lost;
+    all.largest = std::fmax(all.largest, shift.largest);
+  }
+  return fmt::format(
+      "{} of {} checked vertices have no such border within 1/8 of the axis on twice as many "
+      "elements; the others shift by at most {} %.",
+      all.lost, all.checked, solver::readable_number(100.0 * all.largest, 2));
+}
+
 /// Returns the number of regions that tables and the picture show with letters A, B, ... All
 /// smaller regions are shown as one.
 std::size_t shown_regions(const FoundMap& map) {
@@ -424,21 +437,13 @@ protocol::Table table_of_borders(const FoundMap& map) {
 }
 
 std::string tables_of(const FoundMap& map) {
-  CurveShift all{.largest = 0.0};
-  for (const auto& shift : map.shifts) {
-    all.checked += shift.checked;
-    all.lost += shift.lost;
-    all.largest = std::fmax(all.largest, shift.largest);
-  }
   const auto borders = map.borders.vertices.empty() ? "" : text_of(table_of_borders(map)) + '\n';
   return fmt::format(
       "{}\n{}{} vertices, each in a bracket of at most {} of an axis; {} points in {} rounds\n"
-      "{} of {} checked vertices have no such border within 1/8 of the axis on twice as many "
-      "elements; the others shift by at most {} %.\n{}\n",
+      "{}\n{}\n",
       text_of(table_of_regions(map)), borders, format_count(map.borders.vertices.size()),
       solver::exact_number(map.flags.bracket), format_count(map.study.points()), map.study.rounds(),
-      all.lost, all.checked, solver::readable_number(100.0 * all.largest, 2),
-      islands_sentence(map));
+      shifts_sentence(map), islands_sentence(map));
 }
 
 // ---- Numbers ----
@@ -535,10 +540,16 @@ plot::Cells cells_of_numbers(const FoundMap& map) {
 }
 
 plot::Figure figure_of(const FoundMap& map) {
-  plot::Figure figure{
-      .title = fmt::format("Regions of {}", map.flags.of),
-      .subtitle = fmt::format("{}: {} points", map.study.name(), format_count(map.study.points())),
-      .notes = {islands_sentence(map)}};
+  plot::Figure figure{.title = fmt::format("Regions of {}", map.flags.of),
+                      .notes = {shifts_sentence(map), islands_sentence(map)}};
+  for (const auto& axis : map.plane.constants) {
+    figure.subtitle += fmt::format(
+        "{} = {}, ", axis.key(),
+        axis.values_size() == 1 ? solver::readable_number(axis.values(0)) : axis.expression());
+  }
+  figure.subtitle +=
+      fmt::format("{} elements per link, {}: {} points", map.plane.model.elements_per_link,
+                  map.study.name(), format_count(map.study.points()));
   const auto axis_of = [](const MapAxis& axis) {
     auto shown = plot::axis_of(axis.key, server::unit_of_column(server::column_of_key(axis.key)));
     shown.range = {axis.from, axis.to};

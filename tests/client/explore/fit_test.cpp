@@ -266,13 +266,13 @@ TEST(Fit, SearchesAllEndsSideBySide) {
     return evaluate(points, what);
   };
   // With two unknowns an iteration evaluates a point and four finite differences: 5 points. The fit
-  // begins at 16 starts (80 points) and finally searches four interval ends (20 points).
+  // begins with 16 places and finally searches four interval ends (20 points).
   const auto iterations = static_cast<std::size_t>(minimise(problem, problem.start()).iteration);
   EXPECT_THAT(sizes, testing::Each(5U));
   EXPECT_LE(sizes.size(), iterations + 2);
   sizes.clear();
   fit(problem);
-  EXPECT_EQ(sizes.front(), 80U);
+  EXPECT_EQ(sizes.front(), 16U);
   EXPECT_EQ(std::ranges::count(sizes, 20U), 2);
   EXPECT_LE(sizes.size(), iterations + 12);
 }

@@ -156,10 +156,10 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
     EXPECT_THAT(ran.err, HasSubstr(message));
   }
   for (const auto& [x, message] : std::vector<std::pair<std::string, std::string>>{
-           {"mu", "is required as KEY=FROM:TO"},
+           {"mu", "must be KEY=FROM:TO"},
            {"mu=2:1", "mu"},
            {"wind=0:1", "wind"},
-           {"mu=0:1:5", "is required as KEY=FROM:TO"},
+           {"mu=0:1:5", "must be KEY=FROM:TO"},
            {"mu=0.5:0.5", "the ends must differ by more"},
            {"mu=1:1.0000000001", "the ends must differ by more"},
            {"links=1:3", "links must be a whole number"},
