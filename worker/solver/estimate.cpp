@@ -133,7 +133,7 @@ ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& r
   errors.ft_peak = error(rough, &CaseResult::ft_peak_N, result.fn_peak_N);
   errors.duration = error(smooth, &CaseResult::duration_s, result.duration_s);
   errors.stick_total = error(rough, &CaseResult::stick_total_s, result.duration_s);
-  errors.slide = error(smooth, &CaseResult::slide_m, speed_m_s * result.duration_s);
+  errors.slide = error(smooth, &CaseResult::slide_m, result.slide_m);
   errors.impulse_n = error(smooth, &CaseResult::impulse_n_Ns, result.impulse_n_Ns);
   errors.impulse_t = error(smooth, &CaseResult::impulse_t_Ns, result.impulse_n_Ns);
   // The difference of one component of the velocity may vanish by chance, that of the vector not.

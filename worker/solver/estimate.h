@@ -14,8 +14,8 @@ ModelParameters companion_model(const ModelParameters& model);
 /// Estimates the errors of `result`, the result of a point of `model`, from its differences to
 /// `companion`, the result of the same point of `companion_model(model)` (accuracy.md, "Errors of
 /// single results"). Errors of forces are relative to the largest normal force, of impulses to the
-/// normal impulse, of times to the duration, of the slide to speed at touch times duration, and of
-/// speeds to the speed at touch. An error is absent if its scale is 0.
+/// normal impulse, of times to the duration, of the slide to the slide, and of speeds to the speed
+/// at touch. An error is absent if its scale is 0.
 ErrorEstimate estimated_errors(const ModelParameters& model, const CaseResult& result,
                                const CaseResult& companion);
 

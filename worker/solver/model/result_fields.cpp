@@ -259,9 +259,7 @@ constexpr std::array kFields{
                              "estimated error of duration_s, as a fraction of it"),
     error<&Errors::stick_total>("stick_total_error",
                                 "estimated error of stick_total_s, as a fraction of duration_s"),
-    error<&Errors::slide>(
-        "slide_error",
-        "estimated error of slide_m, as a fraction of speed at touch times duration_s"),
+    error<&Errors::slide>("slide_error", "estimated error of slide_m, as a fraction of it"),
     error<&Errors::impulse_n>("impulse_n_error",
                               "estimated error of impulse_n_Ns, as a fraction of it"),
     error<&Errors::impulse_t>("impulse_t_error",

@@ -111,7 +111,7 @@ constexpr std::array kOutputs{
            }},
     Output{"slide", &ErrorEstimate::slide,
            [](const CaseResult& a, const CaseResult& b) {
-             return (a.slide_m - b.slide_m) / (std::hypot(a.vt_in_m_s, a.vn_in_m_s) * a.duration_s);
+             return (a.slide_m - b.slide_m) / a.slide_m;
            }},
     Output{"impulse_n", &ErrorEstimate::impulse_n,
            [](const CaseResult& a, const CaseResult& b) {

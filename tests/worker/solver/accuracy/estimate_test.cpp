@@ -116,6 +116,14 @@ TEST(EstimatedErrors, OfTheExitVelocityAreThoseOfTheVector) {
   EXPECT_NEAR((both - tolerance) / (one - tolerance), std::sqrt(2.0), 1e-9);
 }
 
+TEST(EstimatedErrors, OfTheSlideAreAFractionOfTheSlideItself) {
+  CaseResult companion = some_result();
+  companion.slide_m *= 1.03;
+  const double error = *estimated_errors(coarse_model(64), some_result(), companion).slide;
+  // If both meshes resolve the waves, the estimate is a third of the difference (order 2).
+  EXPECT_NEAR(error - coarse_model().tolerance, 0.01, 1e-5);
+}
+
 TEST(EstimatedErrors, AreAbsentIfTheScaleIsZero) {
   CaseResult result = some_result();
   result.fn_peak_N = 0.0;
