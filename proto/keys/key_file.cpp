@@ -6,7 +6,6 @@
 #include <cstring>
 #include <ctime>
 #include <filesystem>
-#include <limits>
 #include <regex>
 #include <span>
 #include <stdexcept>
@@ -18,6 +17,7 @@
 #include <unistd.h>
 
 #include <sodium.h>
+#include <zmq.h>
 
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
@@ -32,34 +32,16 @@ namespace oblique::protocol {
 
 namespace {
 
-constexpr std::string_view kDigits =
-    "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.-:+=^!/*?&<>()[]{}@%$#";
-constexpr std::size_t kBytesOfGroup = 4;
-constexpr std::size_t kDigitsOfGroup = 5;
-
 /// Returns false if `text` does not encode a key.
 bool decode_z85(std::string_view text, CurveKey& key) {
-  if (text.size() != kKeyCharacters) {
+  if (text.size() != kKeyCharacters || text.find('\0') != std::string_view::npos) {
     return false;
   }
-  for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
-    std::uint64_t number = 0;
-    for (const char digit : text.substr(group * kDigitsOfGroup, kDigitsOfGroup)) {
-      const std::size_t value = kDigits.find(digit);
-      if (value == std::string_view::npos) {
-        return false;
-      }
-      number = number * kDigits.size() + value;
-    }
-    if (number > std::numeric_limits<std::uint32_t>::max()) {
-      return false;
-    }
-    for (std::size_t i = kBytesOfGroup; i > 0; --i) {
-      key[group * kBytesOfGroup + i - 1] = static_cast<std::uint8_t>(number & 0xffU);
-      number >>= 8U;
-    }
-  }
-  return true;
+  std::array<char, kKeyCharacters + 1> terminated{};
+  std::ranges::copy(text, terminated.begin());
+  const bool is_key = zmq_z85_decode(key.data(), terminated.data()) != nullptr;
+  sodium_memzero(terminated.data(), terminated.size());
+  return is_key;
 }
 
 constexpr std::array<std::string_view, 4> kRoles{"server", "client", "worker", "reader"};
@@ -100,19 +82,10 @@ CurveKey public_key_of(const SecretKey& secret_key) {
   return public_key;
 }
 
-// Z85 writes each big-endian number of four bytes as five digits, the most significant first.
 std::string z85(const CurveKey& key) {
-  std::string text(kKeyCharacters, '0');
-  for (std::size_t group = 0; group < text.size() / kDigitsOfGroup; ++group) {
-    std::uint32_t number = 0;
-    for (std::size_t i = 0; i < kBytesOfGroup; ++i) {
-      number = number << 8U | key[group * kBytesOfGroup + i];
-    }
-    for (std::size_t i = kDigitsOfGroup; i > 0; --i) {
-      text[group * kDigitsOfGroup + i - 1] = kDigits[number % kDigits.size()];
-      number /= static_cast<std::uint32_t>(kDigits.size());
-    }
-  }
+  std::string text(kKeyCharacters + 1, '\0');
+  zmq_z85_encode(text.data(), key.data(), key.size());
+  text.pop_back();
   return text;
 }
 
