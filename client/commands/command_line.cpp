@@ -106,10 +106,18 @@ std::string other_name_of(const std::string& command) {
 }
 
 int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
+  const auto lacks_value = [&] {
+    const auto& command = parsed_command(app);
+    const auto message = protocol::missing_value_error(command, argc, argv);
+    return !message.empty() && wrong_usage(console, command, message) != kDone;
+  };
   try {
     app.parse(argc, argv);
-    return kDone;
+    return lacks_value() ? kWrongUsage : kDone;
   } catch (const CLI::ParseError& error) {
+    if (lacks_value()) {
+      return kWrongUsage;
+    }
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       std::ostringstream help;
       const int exit_code = app.exit(error, help, console.errors());
@@ -236,7 +244,7 @@ int run_command_line(Console& console, int argc, const char* const* argv) {
     return wrong_usage(console, app, "no command given; an example: `oblique run STUDY.toml`");
   }
   const int code = parse(console, app, argc, argv);
-  return action ? execute(console, app, action, verbosity) : code;
+  return code == kDone && action ? execute(console, app, action, verbosity) : code;
 }
 
 }  // namespace oblique::client

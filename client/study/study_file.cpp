@@ -218,6 +218,9 @@ class BlockReader {
     if (const auto* where = table_.get("where")) {
       block.set_where(
           file_.text("where", *where, "a condition in quotes, such as \"mu > 0.5 * e\""));
+      if (block.where().empty()) {
+        file_.fail(*where, "where = \"\" is empty: write a condition, or leave `where` out");
+      }
     }
     return block;
   }

@@ -45,6 +45,27 @@ void refuse_empty_values(CLI::App& app) {
   }
 }
 
+std::string missing_value_error(const CLI::App& command, int argc, const char* const* argv) {
+  const auto flag_in = [&](std::string_view word) {
+    const std::string name(word.substr(0, word.find('=')));
+    return name.starts_with("-") ? command.get_option_no_throw(name) : nullptr;
+  };
+  const std::vector<std::string_view> words(argv + 1, argv + argc);
+  for (std::size_t i = 0; i < words.size() && words[i] != "--"; ++i) {
+    const std::size_t equals = words[i].find('=');
+    if (words[i].starts_with("--") && equals == words[i].size() - 1) {
+      return fmt::format("{}: the value is empty", words[i].substr(0, equals));
+    }
+    const CLI::Option* const flag = flag_in(words[i]);
+    if (flag != nullptr && equals == std::string_view::npos && flag->get_items_expected_min() > 0 &&
+        i + 1 < words.size() && flag_in(words[i + 1]) != nullptr) {
+      return fmt::format("{0}: the value is missing; if {1} is the value: {0}={1}", words[i],
+                         words[i + 1]);
+    }
+  }
+  return {};
+}
+
 CLI::Validator number_between(double least, double largest) {
   return CLI::Validator(
       [least, largest](const std::string& text) {
@@ -103,6 +124,9 @@ int report_wrong_usage(const std::string& words, const std::string& message) {
 
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv) {
   refuse_empty_values(app);
+  if (const std::string error = missing_value_error(app, argc, argv); !error.empty()) {
+    return report_wrong_usage(app.get_name(), error);
+  }
   try {
     app.parse(argc, argv);
     return std::nullopt;

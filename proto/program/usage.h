@@ -23,6 +23,11 @@ inline constexpr int kWrongUsage = 2;
 /// value may come from an unset shell variable. Must be called after all options were added.
 void refuse_empty_values(CLI::App& app);
 
+/// Returns an error message if a flag of `command` has no value, else an empty text. CLI11 would take
+/// the next word as the value of `--db=`, and the next flag as the value of `--db`. `command` is the
+/// program or one of its commands; `argv` are all words of the command line.
+std::string missing_value_error(const CLI::App& command, int argc, const char* const* argv);
+
 /// Returns a check for numbers from `least` to `largest`. It refuses NaN.
 CLI::Validator number_between(double least, double largest);
 

@@ -194,8 +194,7 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
       ->configurable(false);
   options.http.add_to(app);
   app.add_option("--only-study", loop.service.only_study,
-                 "Send batches of this study only; other studies wait. "
-                 "Empty: all studies")
+                 "Send batches of this study only; other studies wait")
       ->type_name("NAME")
       ->configurable(false);
   constexpr double kLongestDrain_s = 1e6;

@@ -45,7 +45,7 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
             if each is True:
                 words.append(flag)
             elif each is not None and each is not False:
-                words.append(f"{flag}={each}")
+                words += [flag, str(each)]
     ended = subprocess.run(words, capture_output=True, text=True, check=False)
     if ended.returncode != 0:
         raise (ValueError if ended.returncode == 2 else RuntimeError)(ended.stderr.strip())

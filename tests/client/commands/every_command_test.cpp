@@ -184,6 +184,10 @@ TEST(EveryCommand, RefusesInvalidAndEmptyValuesOfFlags) {
     const Words called = with(command.words, needed_words(command));
     for (const auto& [flag, value] : flags_with_values(command)) {
       expect_wrong_usage(with(called, {flag, ""}), flag);
+      expect_wrong_usage(with(with(command.words, {flag + "="}), needed_words(command)),
+                         flag + ": the value is empty");
+      expect_wrong_usage(with(with(command.words, {flag, "--quiet"}), needed_words(command)),
+                         flag + ": the value is missing");
       if (checked.contains(value)) {
         expect_wrong_usage(with(called, {flag, "vorhanden"}), "vorhanden");
       }
@@ -191,6 +195,19 @@ TEST(EveryCommand, RefusesInvalidAndEmptyValuesOfFlags) {
     }
   }
   EXPECT_GT(flags, 200);
+}
+
+TEST(EveryCommand, RefusesEmptyValuesOfSwitches) {
+  for (const auto& command : every_command()) {
+    for (const std::string flag : {"--quiet", "--verbose"}) {
+      expect_wrong_usage(with(with(command.words, needed_words(command)), {flag + "="}),
+                         flag + ": the value is empty");
+    }
+  }
+}
+
+TEST(Flags, AcceptAValueThatBeginsWithHyphensAfterAnEqualsSign) {
+  expect_wrong_usage({"status", "--server=--quiet"}, "--quiet");
 }
 
 TEST(Flags, OfParametersRefuseValuesOutsideTheirRange) {

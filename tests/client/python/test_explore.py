@@ -31,6 +31,13 @@ def test_wrong_flags_are_a_value_error(folder):
         oblique.sensitivity(H=1, mu=0.4, e=1)
 
 
+def test_an_empty_value_is_refused_before_anything_is_solved(folder):
+    for flags in ({"db": ""}, {"of": ["fn_peak_N", ""]}, {"study": ""}):
+        with pytest.raises(ValueError, match="the value is empty"):
+            oblique.map(**{"x": "mu=0.1:1", "y": "H=0.5:1", "e": 1, "no_reuse": True, **flags})
+    assert list(folder.iterdir()) == []
+
+
 def test_uncertainty_gives_arrays_with_an_entry_for_each_statistic(folder):
     run_oblique(
         "run", "--H", "0.9", "--mu", "0.1:1.8", "--e", "0.8", "--preset", "paper", "--quiet",

@@ -125,6 +125,7 @@ TEST(WrongStudyFile, WithAWrongKeyOfABlockIsRefused) {
        {"I = 'AA^2'", "5:5", "I = \"AA^2\": unknown key `AA`"},
        {"columns = { H = 'a' }", "5:11", "columns needs `csv`"},
        {"sample = 'sobol'", "5:10", "sample = 'sobol' is a string"},
+       {"where = ''", "5:9", "where = \"\" is empty"},
        {"sample = { kind = 'sobol' }", "5:10", "lacks `count`"},
        {"sample = { kind = 'sobl', count = 3 }", "5:10", "did you mean `sobol`"},
        {"sample = { kind = 'sobol', count = 1e5 }", "5:36", "it must be an integer"},
