@@ -45,7 +45,8 @@ NewCommand<Flags> new_command(CLI::App& app, Action& parsed, const std::string& 
   return {*command, *flags};
 }
 
-// Each of these functions adds commands with flags, help and examples to `app`.
+// Each of these functions adds commands with flags, help and examples to `app`. Those of `fit`,
+// `map`, `sensitivity` and `uncertainty` are in client/explore.
 void add_solve(CLI::App& app, Action& parsed);
 void add_run(CLI::App& app, Action& parsed);
 void add_study(CLI::App& app, Action& parsed);
@@ -72,7 +73,6 @@ void add_autoscale(CLI::App& app, Action& parsed);
 /// `keygen` and `keys`.
 void add_keys(CLI::App& app, Action& parsed);
 void add_doctor(CLI::App& app, Action& parsed);
-// In client/explore:
 void add_map(CLI::App& app, Action& parsed);
 
 /// Parses and carries out the command line. Returns the exit code: 0 done, 1 failed, 2 wrong usage,

@@ -13,7 +13,6 @@
 #include "client/io/child_process.h"
 #include "client/io/console.h"
 #include "client/service/connection.h"
-#include "client/service/run_service.h"
 #include "client/service/source.h"
 #include "client/study/study.h"
 #include "proto/keys/key_file.h"
@@ -96,7 +95,7 @@ class EmbeddedService {
 /// remedy. Returns an empty text if they can.
 std::string objection_to_waiting(const protocol::StudyStatus& status);
 
-/// Settings for solving a study with a temporary server, for `run` and `paper`.
+/// Settings for solving a study with a temporary server, for `run` and explorations.
 struct RunSettings {
   ServiceSettings service{.database = DatabaseSettings().file};
   bool no_reuse = false;   ///< same as SubmitSettings::no_reuse

@@ -45,7 +45,8 @@ TEST(FramesTest, ATruncatedFrameIsNotTheWholeMessage) {
       EXPECT_NE(received.kind_case(), WorkerMessage::kResults) << length << " bytes";
     }
   }
-  // decode() refuses each truncated frame except the empty one, a message without a kind.
+  // decode() refuses every truncated frame but the empty one, which is a valid message without a
+  // kind.
   EXPECT_EQ(refused, static_cast<int>(frame.size()) - 1);
 }
 

@@ -123,7 +123,7 @@ TEST(Pendulum, SwingsLikeARigidPendulumInTheStiffLimit) {
                               (8.0 * model.E_Pa * model.I_m4);
     const std::string what =
         "pendulum, E * " + std::to_string(std::lround(stiffening)) + ", quarter period, ";
-    const std::string reason = "a tenth of its sag as a cantilever, of L";
+    const std::string reason = "a tenth of the sag of the pendulum as a cantilever, relative to L";
     expect_at_most({what + "explicit", reference,
                     error(by_explicit, 0.5 * solver::Pefrl::stability_limit() /
                                            chain.highest_frequency_rad_s(0.0)),

@@ -85,7 +85,8 @@ export const command = (name, text) =>
 
 const focusable = "a[href], button, input, select, [tabindex]";
 const containers = ["THEAD", "TBODY", "TR"];
-// Equal elements of these kinds may have different contents, because these are not attributes.
+// Elements of these kinds may differ although isEqualNode() finds them equal: it compares attributes,
+// and the value of an input or the pixels of a canvas are none.
 const withState = "input, select, canvas";
 
 /**

@@ -142,8 +142,8 @@ TEST_F(PefrlOnAChain, SteppingBackReturnsToTheStart) {
     motion_->step(state, force_, -2e-6, back);
     std::swap(state, back);
   }
-  // The tolerances allow for rounding. Slopes have size 1, and their rates change by up to 1e6 per
-  // second.
+  // The tolerances allow for rounding. The slopes in q are of size 1. The rates in v change by up
+  // to 1e6 per second.
   EXPECT_LT(distance(state.q, start_.q), 1e-13);
   EXPECT_LT(distance(state.v, start_.v), 1e-7);
   EXPECT_LT(distance(state.v, start_.v), 1e-8 * distance(advance(4e-5, 20).state.v, start_.v));
