@@ -13,7 +13,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -26,7 +25,7 @@
 #include "proto/program/origin/origin.h"
 #include "proto/program/process.h"
 #include "proto/program/usage.h"
-#include "proto/system/available_memory.h"
+#include "proto/system/resources.h"
 #include "worker/session.h"
 #include "worker/solver/fall_cache.h"
 #include "worker/solver/model/number.h"
@@ -167,9 +166,11 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--name", session.name, "Name of the worker in lists; the default is HOST:PROCESS")
       ->type_name("NAME")
       ->check(check_name);
-  session.threads = std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMaxThreads);
+  session.threads =
+      std::min<std::size_t>(oblique::protocol::usable_processors().count, kMaxThreads);
   app.add_option("--threads", session.threads,
-                 "Threads that solve points; the default is one for each core")
+                 "Threads that solve points; the default is one for each processor that this "
+                 "process may use")
       ->capture_default_str()
       ->check(CLI::Range(std::size_t{1}, kMaxThreads));
   app.add_option(

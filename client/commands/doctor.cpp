@@ -13,7 +13,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -25,6 +24,7 @@
 #include "client/service/source.h"
 #include "proto/keys/key_file.h"
 #include "proto/program/origin/origin.h"
+#include "proto/system/resources.h"
 #include "proto/text.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"
@@ -119,9 +119,11 @@ std::string processor_name() {
 
 void check_processor(Diagnosis& diagnosis) {
   const std::string set = solver::instruction_set();
-  diagnosis.ok("processor", fmt::format("{}; {} of {} threads may be used; the solver uses {}",
-                                        processor_name(), std::thread::hardware_concurrency(),
-                                        sysconf(_SC_NPROCESSORS_ONLN), set));
+  const auto usable = protocol::usable_processors();
+  diagnosis.ok("processor",
+               fmt::format("{}; {} of {} threads may be used{}{}; the solver uses {}",
+                           processor_name(), usable.count, sysconf(_SC_NPROCESSORS_ONLN),
+                           usable.reason.empty() ? "" : ": ", usable.reason, set));
   if (set != "avx512" && set != "avx2") {
     diagnosis.warning("processor",
                       "the solver is more than twice as fast with AVX2: give the virtual machine "

@@ -8,7 +8,6 @@
 #include <optional>
 #include <set>
 #include <span>
-#include <thread>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -16,6 +15,7 @@
 #include "client/io/console.h"
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
+#include "proto/system/resources.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/falls.h"
 #include "worker/solver/fast/kernels.h"
@@ -93,7 +93,7 @@ double falls_time_s(const StudyCost& cost, double falls) {
 
 StudyCost measured_cost(const protocol::PointTable& table, const protocol::StudySize& size) {
   StudyCost cost;
-  cost.threads = std::max(1U, std::thread::hardware_concurrency());
+  cost.threads = protocol::usable_processors().count;
   std::set<std::uint64_t> different;
   std::vector<ModelParameters> models;  // models with different falls
   for (const std::uint64_t example : size.examples) {

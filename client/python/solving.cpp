@@ -23,7 +23,7 @@
 #include "proto/recipe/blocks.h"
 #include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
-#include "proto/system/available_memory.h"
+#include "proto/system/resources.h"
 #include "worker/solver/library/solver.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
@@ -474,6 +474,7 @@ struct ManyPoints {
 py::dict solve_many(const Falls& falls, const py::dict& keys, std::size_t count,
                     std::size_t threads, bool errors, const py::object& progress) {
   const auto many = std::make_shared<ManyPoints>(count, points_of(keys, count));
+  threads = threads != 0 ? threads : protocol::usable_processors().count;
   const auto work = [many, threads, errors, falls](const std::atomic<bool>& stop) {
     many->solve({.threads = threads, .errors = errors, .falls = falls}, stop);
     return true;

@@ -25,7 +25,7 @@
 #include "client/service/watching.h"
 #include "client/study/study.h"
 #include "proto/result_message.h"
-#include "proto/system/available_memory.h"
+#include "proto/system/resources.h"
 #include "proto/text.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/parameters.h"
@@ -232,7 +232,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
 void EmbeddedService::start_worker(const ServiceSettings& settings) {
   // The workers share the cores, and the memory for cached falls.
   const auto workers = static_cast<unsigned>(settings.workers);
-  const unsigned threads = std::max(1U, std::thread::hardware_concurrency() / workers);
+  const unsigned threads = std::max(1U, protocol::usable_processors().count / workers);
   const std::uint64_t all_bytes =
       settings.fall_memory_bytes != 0
           ? settings.fall_memory_bytes

@@ -1,16 +1,20 @@
 // Tests of functions for files, memory and addresses.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <string>
 
+#include <sched.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "proto/address.h"
 #include "proto/small_file.h"
-#include "proto/system/available_memory.h"
+#include "proto/system/resources.h"
 #include "tests/support/temporary_folder.h"
 #include "worker/solver/model/errors.h"
 
@@ -55,14 +59,80 @@ TEST_F(SmallFile, IsRefusedWithoutBlockingIfMissingTooLongOrNotRegular) {
               HasSubstr("it is a pipe, and must be a regular file of at most 10 bytes"));
 }
 
-TEST(MemoryLimit, IsTheSmallestOfTheProcessGroupAndItsParents) {
-  const test::TemporaryFolder folder;
-  std::filesystem::create_directories(folder.path() / "a" / "b");
-  std::ofstream(folder.file("a/memory.max")) << "500000000\n";
-  std::ofstream(folder.file("a/b/memory.max")) << "max\n";
-  const std::string root = folder.path().string();
-  EXPECT_EQ(memory_limit_bytes(root, "0::/a/b\n"), 500'000'000U);
-  EXPECT_FALSE(memory_limit_bytes(root, "0::/\n"));
+/// A root folder whose files tests write.
+class ControlGroups : public testing::Test {
+ protected:
+  void write(const std::string& file, const std::string& text) const {
+    const auto path = folder_.path() / file;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path) << text;
+  }
+
+  test::TemporaryFolder folder_;
+  std::string root_ = folder_.path().string();
+};
+
+TEST_F(ControlGroups, LimitMemoryByTheSmallestOfTheProcessGroupAndItsParents) {
+  write("proc/meminfo", "MemTotal: 4000000 kB\nMemAvailable: 1000000 kB\n");
+  write("proc/self/cgroup", "0::/\n");
+  EXPECT_EQ(available_memory_bytes(root_), 1'024'000'000U);
+  write("sys/fs/cgroup/a/memory.max", "500000000\n");
+  write("sys/fs/cgroup/a/b/memory.max", "max\n");
+  EXPECT_EQ(available_memory_bytes(root_), 1'024'000'000U);
+  write("proc/self/cgroup", "0::/a/b\n");
+  EXPECT_EQ(available_memory_bytes(root_), 500'000'000U);
+}
+
+/// Calls `check` while the affinity mask of this thread has the first `allowed` of its processors.
+void with_processors(int allowed, const std::function<void()>& check) {
+  cpu_set_t mask;
+  ASSERT_EQ(sched_getaffinity(0, sizeof mask, &mask), 0);
+  const cpu_set_t before = mask;
+  for (int i = 0, kept = 0; i < CPU_SETSIZE; ++i) {
+    if (CPU_ISSET(i, &mask) && ++kept > allowed) {
+      CPU_CLR(i, &mask);
+    }
+  }
+  ASSERT_EQ(sched_setaffinity(0, sizeof mask, &mask), 0);
+  check();
+  ASSERT_EQ(sched_setaffinity(0, sizeof before, &before), 0);
+}
+
+TEST_F(ControlGroups, WithoutQuotasTheAffinityMaskLimitsProcessors) {
+  with_processors(1, [&] {
+    const Processors usable = usable_processors(root_);
+    EXPECT_EQ(usable.count, 1U);
+    if (sysconf(_SC_NPROCESSORS_ONLN) > 1) {
+      EXPECT_THAT(usable.reason, HasSubstr("affinity"));
+    }
+  });
+}
+
+TEST_F(ControlGroups, LimitProcessorsByTheSmallestQuota) {
+  const unsigned all = usable_processors(root_).count;
+  ASSERT_GE(all, 1U);
+  write("proc/self/cgroup", "4:cpuset:/x\n3:cpu,cpuacct:/b/c\n0::/a/in\n");
+  write("sys/fs/cgroup/a/in/cpu.max", "max 100000\n");
+  write("sys/fs/cgroup/a/cpu.max", "400000000 100000\n");
+  write("sys/fs/cgroup/cpu,cpuacct/b/c/cpu.cfs_quota_us", "-1\n");
+  write("sys/fs/cgroup/cpu,cpuacct/b/c/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(usable_processors(root_).count, all) << "4000 processors";
+  EXPECT_EQ(usable_processors(root_).reason, usable_processors("/nowhere").reason);
+  const auto expect_one = [&](const std::string& quota) {
+    EXPECT_EQ(usable_processors(root_).count, 1U);
+    if (all > 1) {
+      EXPECT_THAT(usable_processors(root_).reason, HasSubstr(" is " + quota + " processors"));
+    }
+  };
+  write("sys/fs/cgroup/a/cpu.max", "20000 100000\n");
+  expect_one("0.2");
+  write("sys/fs/cgroup/a/cpu.max", "max 100000\n");
+  write("sys/fs/cgroup/cpu,cpuacct/cpu.cfs_quota_us", "10000\n");
+  write("sys/fs/cgroup/cpu,cpuacct/cpu.cfs_period_us", "100000\n");
+  expect_one("0.1");
+  write("proc/self/cgroup", "0::/half\n");
+  write("sys/fs/cgroup/half/cpu.max", "150000 100000\n");
+  EXPECT_EQ(usable_processors(root_).count, std::min(all, 2U)) << "1.5 processors";
 }
 
 TEST(Address, NeedsAValidPortAndBracketsAroundIpv6) {
