@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -116,7 +117,7 @@ int run_worker(Options options) {
   SessionSettings& settings = options.session;
   oblique::protocol::Notifier notifier;
   oblique::protocol::StopSignals stop;  // must be constructed before any thread starts
-  oblique::protocol::survive_failed_writes();
+  std::signal(SIGPIPE, SIG_IGN);        // makes writes to closed pipes return an error
   if (!oblique::protocol::stop_with_parent(options.parent)) {
     spdlog::warn("the parent process ended before this one started");
     return oblique::protocol::kDone;
@@ -210,7 +211,7 @@ int run_program(int argc, char** argv) {
   }
   if (configuration.is_to_be_printed()) {
     std::cout << configuration.printed();
-    return oblique::protocol::kDone;
+    return oblique::protocol::end_output(std::cout, app.get_name(), oblique::protocol::kDone);
   }
   if (const std::string error = set_exit(session.conversation.exit, options.idle_exit_s);
       !error.empty()) {
@@ -234,10 +235,11 @@ int run_program(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  oblique::protocol::prepare_process();
   try {
     return run_program(argc, argv);
   } catch (const std::exception& error) {
-    spdlog::error("{}", error.what());
+    spdlog::error("{}", oblique::protocol::failure_text(error));
     return oblique::protocol::kFailed;
   }
 }

@@ -3,9 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstddef>
 #include <exception>
 #include <map>
@@ -20,6 +18,7 @@
 #include "client/io/console.h"
 #include "client/io/row_output.h"
 #include "proto/program/origin/origin.h"
+#include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "server/query/columns.h"
 #include "worker/solver/model/errors.h"
@@ -106,24 +105,20 @@ std::string other_name_of(const std::string& command) {
 }
 
 int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
-  const auto lacks_value = [&] {
-    const auto& command = parsed_command(app);
-    const auto message = protocol::missing_value_error(command, argc, argv);
-    return !message.empty() && wrong_usage(console, command, message) != kDone;
-  };
+  const auto empty = protocol::empty_value_error(argc, argv);
   try {
     app.parse(argc, argv);
-    return lacks_value() ? kWrongUsage : kDone;
+    return empty.empty() ? kDone : wrong_usage(console, parsed_command(app), empty);
   } catch (const CLI::ParseError& error) {
-    if (lacks_value()) {
-      return kWrongUsage;
+    if (!empty.empty()) {
+      return wrong_usage(console, parsed_command(app), empty);
     }
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       std::ostringstream help;
       const int exit_code = app.exit(error, help, console.errors());
       const std::size_t width = terminal_size(STDOUT_FILENO).columns;
       console.out() << (width > 0 ? fitted_help(help.str(), width, kHelpColumn) : help.str());
-      return exit_code;
+      return protocol::end_output(console.out(), words_of(parsed_command(app)), exit_code);
     }
     auto& command = parsed_command(app);
     const auto unexpected = app.remaining(true);
@@ -136,29 +131,17 @@ int parse(Console& console, CLI::App& app, int argc, const char* const* argv) {
   }
 }
 
-/// Exit code if the reader of the output has closed it; programs killed by SIGPIPE have it too.
-constexpr int kReaderGone = 128 + SIGPIPE;
-
 int carry_out(Console& console, const std::string& words, const Action& action) {
   try {
-    const int code = action(console);
-    errno = 0;
-    if (console.out().flush()) {
-      return code;
-    }
-    if (errno == EPIPE) {
-      return kReaderGone;
-    }
-    console.error(words, "standard output could not be written");
-    return kFailed;
+    return protocol::end_output(console.out(), words, action(console));
   } catch (const ClosedPipe&) {
-    return kReaderGone;
+    return protocol::kReaderGone;
   } catch (const solver::InputError& error) {
     console.error(words, error.what());
     return kWrongUsage;
   } catch (const std::exception& error) {
     console.out().flush();
-    console.error(words, error.what());
+    console.error(words, protocol::failure_text(error));
     return kFailed;
   }
 }
@@ -236,7 +219,6 @@ int run_command_line(Console& console, int argc, const char* const* argv) {
   add_commands(app, action);
   VerbosityFlags verbosity;
   add_verbosity_flags(app, verbosity);
-  protocol::refuse_empty_values(app);
   if (const auto exit_code = protocol::print_completion(app, argc, argv, columns_of_values())) {
     return *exit_code;
   }

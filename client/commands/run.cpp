@@ -25,7 +25,6 @@ struct RunFlags {
 };
 
 int run(const RunFlags& flags, Console& console) {
-  check_settings(flags.settings);
   const auto study = checked_study(console, flags.study);
   refuse_used_database(flags.settings.service.database);
   note_unusual_values(console.notes(), study.recipe);

@@ -63,7 +63,6 @@ int view(const ViewFlags& flags, Console& console) {
         "--server is not allowed: view shows a database file. A server has its own page: it prints "
         "the address when it starts; `oblique-server --http ADDRESS:PORT` sets it");
   }
-  check_settings(flags.settings);
   ServiceSettings how = flags.settings.service;
   const std::string file = protocol::visible(how.database.string());
   if (!std::filesystem::exists(how.database)) {

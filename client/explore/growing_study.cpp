@@ -62,7 +62,6 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
   if (is_server_named && flags.source.database.empty()) {
     where = connection_settings(console, flags.source);
   } else {
-    check_settings(flags.run);
     ServiceSettings settings = flags.run.service;
     if (!flags.source.database.empty()) {
       settings.database = flags.source.database;

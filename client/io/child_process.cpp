@@ -79,12 +79,15 @@ int spawn(const ChildSettings& settings, int input, int output, int errors, pid_
   duplicate(settings.handed_over, ChildProcess::kHandedOver);
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
-  sigset_t none;
-  sigemptyset(&none);
-  posix_spawnattr_setsigmask(&attributes, &none);
+  sigset_t signals;
+  sigemptyset(&signals);
+  posix_spawnattr_setsigmask(&attributes, &signals);
+  sigaddset(&signals, SIGXFSZ);  // ignored in this process; another program may expect it
+  posix_spawnattr_setsigdefault(&attributes, &signals);
   posix_spawnattr_setpgroup(&attributes, 0);
   const int group = settings.stays_in_our_group ? 0 : POSIX_SPAWN_SETPGROUP;
-  posix_spawnattr_setflags(&attributes, static_cast<short>(POSIX_SPAWN_SETSIGMASK | group));
+  posix_spawnattr_setflags(
+      &attributes, static_cast<short>(POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | group));
   std::vector<std::string> texts{settings.program.string()};
   texts.insert(texts.end(), settings.arguments.begin(), settings.arguments.end());
   std::vector<char*> arguments;

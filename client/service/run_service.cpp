@@ -1,7 +1,9 @@
 #include "client/service/run_service.h"
 
+#include <netinet/in.h>
 #include <poll.h>
 #include <stdlib.h>
+#include <sys/socket.h>
 #include <unistd.h>
 #include <algorithm>
 #include <array>
@@ -158,16 +160,20 @@ std::string objection_to_waiting(const protocol::StudyStatus& status) {
 
 std::string why_silent(const std::filesystem::path& database) {
   return fmt::format(
-      "the server runs, but waits for its database {0}, which is slow or damaged; `oblique check "
-      "--db {0}` examines it",
+      "the server runs, but does not answer: its database {0} may be slow or damaged, which "
+      "`oblique "
+      "check --db {0}` examines, or a firewall may block 127.0.0.1",
       database.string());
 }
 
-EphemeralKeys::EphemeralKeys()
-    : folder_((std::filesystem::temp_directory_path() / "oblique-run-XXXXXX").string()) {
+EphemeralKeys::EphemeralKeys() {
+  const std::string named = environment_variable("TMPDIR").value_or("");
+  folder_ = (named.empty() ? "/tmp" : named) + "/oblique-run-XXXXXX";
   if (::mkdtemp(folder_.data()) == nullptr) {
     throw std::runtime_error(
-        fmt::format("cannot create a folder for keys, {}: {}", folder_, std::strerror(errno)));
+        fmt::format("cannot create a folder for keys in {}: {}. TMPDIR may name another folder, "
+                    "which must exist",
+                    named.empty() ? "/tmp" : named, std::strerror(errno)));
   }
   try {
     protocol::make_key_folder(folder_);
@@ -218,6 +224,13 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
     client_url_ = urls.value("client", std::string());
     worker_url_ = urls.value("worker", std::string());
     page_url_ = urls.value("page", std::string());
+    // Connecting a UDP socket sends nothing. It fails if the address cannot be reached.
+    const Descriptor probe(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    const sockaddr_in loopback{AF_INET, htons(1), {htonl(INADDR_LOOPBACK)}, {}};
+    if (::connect(probe.number(), reinterpret_cast<const sockaddr*>(&loopback), sizeof loopback)) {
+      throw ProcessError(fmt::format(
+          "cannot connect to 127.0.0.1: {}. Is the loopback interface up?", std::strerror(errno)));
+    }
     return;
   }
   // The server closes the pipe when it ends; its output is then complete.
@@ -279,22 +292,12 @@ void EmbeddedService::stop() {
   end_all(server);
 }
 
-void check_settings(const RunSettings& settings) {
-  constexpr int kMaxWorkers = 1024;
-  if (settings.service.workers < 1 || settings.service.workers > kMaxWorkers) {
-    throw solver::InputError(fmt::format("--workers {} is not allowed: it must be from 1 to {}",
-                                         settings.service.workers, kMaxWorkers));
-  }
-  if (settings.rows < 0) {
-    throw solver::InputError(
-        fmt::format("--limit {} is not allowed: it must be >= 0", settings.rows));
-  }
-}
-
 void add_worker_flags(CLI::App& command, RunSettings& settings) {
+  constexpr int kMaxWorkers = 1024;
   command
       .add_option("--workers", settings.service.workers,
                   "number of worker processes, which share the cores of this machine")
+      ->check(CLI::Range(1, kMaxWorkers).description(""))
       ->type_name("N")
       ->capture_default_str();
   command
@@ -309,7 +312,6 @@ void add_worker_flags(CLI::App& command, RunSettings& settings) {
 
 std::optional<RunEnd> run_study(Console& console, const Study& study, const RunSettings& settings,
                                 protocol::StopSignals& stop) {
-  check_settings(settings);
   try {
     ServiceSettings how = settings.service;
     how.only_study = study.name;

@@ -105,9 +105,6 @@ struct RunSettings {
 /// Adds --workers, --fall-memory and --verbose. `settings` must live as long as `command`.
 void add_worker_flags(CLI::App& command, RunSettings& settings);
 
-/// Throws solver::InputError, with the flag, for a wrong number of workers or rows.
-void check_settings(const RunSettings& settings);
-
 struct RunEnd {
   protocol::StudyStatus status;
   std::vector<protocol::QueryReply> rows;  ///< chunks that contain the first results

@@ -164,7 +164,7 @@ std::optional<int> print_completion(CLI::App& app, int argc, const char* const* 
       replaced(std::string(shell == "zsh" ? kZsh : kBash), "BOTH_SHELLS", kBothShells);
   std::cout << replaced(replaced(script, "NAME", app.get_name()), "CASES",
                         cases_of(app, "", words));
-  return std::cout.flush() ? kDone : kFailed;
+  return end_output(std::cout, app.get_name(), kDone);
 }
 
 }  // namespace oblique::protocol

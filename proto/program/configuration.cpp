@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstdlib>
 #include <filesystem>
 #include <regex>
 #include <span>
@@ -15,6 +14,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/program/process.h"
 #include "proto/program/usage.h"
 #include "proto/small_file.h"
 #include "proto/text.h"
@@ -26,13 +26,6 @@ namespace {
 
 constexpr std::array<std::string_view, 4> kLevels{"debug", "info", "warning", "error"};
 constexpr std::array<std::string_view, 2> kFormats{"text", "json"};
-
-/// Returns the value of an environment variable; empty if it is not set. Containers and units set a
-/// variable to an empty text in order to omit it.
-std::string variable(const std::string& name) {
-  const char* const value = name.empty() ? nullptr : std::getenv(name.c_str());
-  return value == nullptr ? "" : value;
-}
 
 /// Returns the key of an option: "worker_port" for "--worker-port".
 std::string key_of(const CLI::Option& option) {
@@ -152,7 +145,7 @@ std::optional<int> Configuration::parse(int argc, const char* const* argv) {
 }
 
 std::string Configuration::file_to_read() const {
-  const std::string path = file_.empty() ? variable(prefix_ + "CONFIG") : file_;
+  const std::string path = file_.empty() ? environment_value(prefix_ + "CONFIG") : file_;
   std::error_code unknown;
   const bool takes_default =
       path.empty() && (std::filesystem::exists(default_file_, unknown) || unknown);
@@ -165,7 +158,7 @@ void Configuration::set_from_environment(std::string& place) const {
     std::transform(own.begin(), own.end(), own.begin(),
                    [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
     for (const std::string& name : {own, setting.shared_variable}) {
-      const std::string value = variable(name);
+      const std::string value = environment_value(name);
       if (!value.empty() && setting.option->count() == 0) {
         place = fmt::format("environment variable {}: ", name);
         set(*setting.option, {value});

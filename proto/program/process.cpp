@@ -1,5 +1,6 @@
 #include "proto/program/process.h"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
@@ -10,9 +11,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <string>
 #include <system_error>
 
@@ -32,12 +35,54 @@ void check_call(bool is_done, const char* what) {
   }
 }
 
-std::string environment_value(const char* name) {
-  const char* const value = std::getenv(name);
-  return value == nullptr ? "" : value;
+/// Handles an exception that nothing catches. Errors other than a lack of memory or threads abort.
+[[noreturn]] void end_process() {
+  const auto uncaught = std::current_exception();
+  try {
+    uncaught ? std::rethrow_exception(uncaught) : std::abort();
+  } catch (const std::exception& error) {
+    const char* const text = failure_text(error);
+    dprintf(STDERR_FILENO, "%s: %s\n", program_invocation_short_name, text);
+    text != error.what() ? _exit(1) : std::abort();
+  }
 }
 
 }  // namespace
+
+std::string environment_value(const std::string& name) {
+  const char* const value = name.empty() ? nullptr : std::getenv(name.c_str());
+  return value == nullptr ? "" : value;
+}
+
+void prepare_process(rlim_t wanted_files) {
+  int null = ::open("/dev/null", O_RDWR);
+  while (null >= 0 && null <= STDERR_FILENO) {
+    null = ::open("/dev/null", O_RDWR);
+  }
+  ::close(null);
+  std::signal(SIGXFSZ, SIG_IGN);
+  std::set_terminate(end_process);
+  rlimit files{};
+  constexpr rlim_t kLeastFiles = 64;
+  if (getrlimit(RLIMIT_NOFILE, &files) == 0) {
+    files.rlim_cur = std::max(files.rlim_cur, std::min(wanted_files, files.rlim_max));
+    if (setrlimit(RLIMIT_NOFILE, &files) == 0 && files.rlim_cur < kLeastFiles) {
+      dprintf(STDERR_FILENO, "%s: the limit on open files (ulimit -n) is %d; %d are needed\n",
+              program_invocation_short_name, static_cast<int>(files.rlim_cur), int{kLeastFiles});
+      _exit(1);
+    }
+  }
+}
+
+const char* failure_text(const std::exception& error) {
+  const auto* const failure = dynamic_cast<const std::system_error*>(&error);
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr
+             ? "out of memory: raise the limit of this process (ulimit -v) or of its container"
+         : failure != nullptr && failure->code() == std::errc::resource_unavailable_try_again
+             ? "no further thread can be started: raise the limit on processes (ulimit -u) or on "
+               "memory (ulimit -v)"
+             : error.what();
+}
 
 StopSignals::StopSignals() {
   sigset_t signals;
@@ -74,11 +119,6 @@ bool StopSignals::wait(std::chrono::nanoseconds longest) {
   pollfd item{descriptor(), POLLIN, 0};
   static_cast<void>(poll(&item, 1, static_cast<int>(left)));
   return requested();
-}
-
-void survive_failed_writes() {
-  std::signal(SIGPIPE, SIG_IGN);
-  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 void add_stop_with_parent(CLI::App& app, pid_t& parent) {

@@ -1,17 +1,33 @@
 #pragma once
 
+#include <sys/resource.h>
 #include <sys/types.h>
 
 #include <chrono>
 #include <csignal>
+#include <exception>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
 #include "proto/system/descriptor.h"
 
-// Signals, parent process and service manager of long-running programs.
+// Standard streams, limits, signals, parent process and service manager of the programs.
 namespace oblique::protocol {
+
+/// Prepares this process; the first call of `main`. Opens missing standard streams on the null
+/// device, because other files would take their place. Makes a write beyond the file size limit
+/// return an error. Raises the limit on open files to `wanted_files` if that is allowed. Ends the
+/// process with exit code 1 and a sentence if the limit is below 64, and later if memory or threads
+/// run out where nothing catches the exception.
+void prepare_process(rlim_t wanted_files = 64);
+
+/// Returns the message of `error`, with the remedy if memory or threads have run out.
+const char* failure_text(const std::exception& error);
+
+/// Returns the value of an environment variable; empty if it is not set. Containers and units set a
+/// variable to an empty text in order to omit it.
+std::string environment_value(const std::string& name);
 
 /// While this object exists, SIGINT, SIGTERM and SIGHUP make a descriptor readable instead of
 /// ending the program. If SIGHUP was ignored when the program started, for example by nohup, it
@@ -42,10 +58,6 @@ class StopSignals {
   Descriptor descriptor_;
   int signal_ = 0;  ///< number of the first signal; 0 if none has arrived
 };
-
-/// Makes a write to a pipe without a reader, or beyond the file size limit, return an error instead
-/// of ending the program.
-void survive_failed_writes();
 
 /// Adds the option --stop-with-parent PID, which sets `parent`.
 void add_stop_with_parent(CLI::App& app, pid_t& parent);

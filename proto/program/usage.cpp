@@ -1,7 +1,9 @@
 #include "proto/program/usage.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
+#include <cstring>
 #include <iostream>
 #include <iterator>
 #include <system_error>
@@ -12,10 +14,6 @@
 
 namespace oblique::protocol {
 namespace {
-
-std::string empty_value_error(const std::string& value) {
-  return value.empty() ? "the value is empty" : "";
-}
 
 /// Returns the names of the flags and subcommands of `command`.
 std::vector<std::string> known_words(const CLI::App& command) {
@@ -33,34 +31,12 @@ std::vector<std::string> known_words(const CLI::App& command) {
 
 }  // namespace
 
-void refuse_empty_values(CLI::App& app) {
-  for (auto* option : app.get_options()) {
-    // Options that need no value are not checked.
-    if (option->get_items_expected_min() > 0) {
-      option->check(empty_value_error);
-    }
-  }
-  for (auto* command : app.get_subcommands({})) {
-    refuse_empty_values(*command);
-  }
-}
-
-std::string missing_value_error(const CLI::App& command, int argc, const char* const* argv) {
-  const auto flag_in = [&](std::string_view word) {
-    const std::string name(word.substr(0, word.find('=')));
-    return name.starts_with("-") ? command.get_option_no_throw(name) : nullptr;
-  };
-  const std::vector<std::string_view> words(argv + 1, argv + argc);
-  for (std::size_t i = 0; i < words.size() && words[i] != "--"; ++i) {
-    const std::size_t equals = words[i].find('=');
-    if (words[i].starts_with("--") && equals == words[i].size() - 1) {
-      return fmt::format("{}: the value is empty", words[i].substr(0, equals));
-    }
-    const CLI::Option* const flag = flag_in(words[i]);
-    if (flag != nullptr && equals == std::string_view::npos && flag->get_items_expected_min() > 0 &&
-        i + 1 < words.size() && flag_in(words[i + 1]) != nullptr) {
-      return fmt::format("{0}: the value is missing; if {1} is the value: {0}={1}", words[i],
-                         words[i + 1]);
+std::string empty_value_error(int argc, const char* const* argv) {
+  for (int i = 1; i < argc && std::string_view(argv[i]) != "--"; ++i) {
+    const std::string word = argv[i];
+    const std::string name = word.substr(0, word.find('='));
+    if (word.empty() || (word.starts_with("--") && word == name + '=')) {
+      return fmt::format("{}: the value is empty", word.empty() ? argv[i - 1] : name);
     }
   }
   return {};
@@ -122,9 +98,24 @@ int report_wrong_usage(const std::string& words, const std::string& message) {
   return kWrongUsage;
 }
 
+int end_output(std::ostream& out, const std::string& words, int code) {
+  const bool failed_before = !out;
+  out.clear();  // the next write gives the reason again
+  errno = 0;
+  if (out.flush() && !failed_before) {
+    return code;
+  }
+  if (errno == EPIPE) {
+    return kReaderGone;
+  }
+  std::cerr << words
+            << ": standard output could not be written: " << std::strerror(errno != 0 ? errno : EIO)
+            << '\n';
+  return kFailed;
+}
+
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv) {
-  refuse_empty_values(app);
-  if (const std::string error = missing_value_error(app, argc, argv); !error.empty()) {
+  if (const std::string error = empty_value_error(argc, argv); !error.empty()) {
     return report_wrong_usage(app.get_name(), error);
   }
   try {
@@ -132,7 +123,7 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
-      return app.exit(error, std::cout, std::cerr);
+      return end_output(std::cout, app.get_name(), app.exit(error, std::cout, std::cerr));
     }
     return report_wrong_usage(app.get_name(), parse_error_message(app, app, error));
   }

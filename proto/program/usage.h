@@ -1,6 +1,8 @@
 #pragma once
 
+#include <csignal>
 #include <cstdint>
+#include <iosfwd>
 #include <map>
 #include <optional>
 #include <span>
@@ -18,15 +20,14 @@ namespace oblique::protocol {
 inline constexpr int kDone = 0;
 inline constexpr int kFailed = 1;
 inline constexpr int kWrongUsage = 2;
+/// The reader of standard output has closed it. Programs that SIGPIPE ends have this exit code,
+/// too.
+inline constexpr int kReaderGone = 128 + SIGPIPE;
 
-/// Refuses empty values of all options and arguments of `app` and its commands, because an empty
-/// value may come from an unset shell variable. Must be called after all options were added.
-void refuse_empty_values(CLI::App& app);
-
-/// Returns an error message if a flag of `command` has no value, else an empty text. CLI11 would take
-/// the next word as the value of `--db=`, and the next flag as the value of `--db`. `command` is the
-/// program or one of its commands; `argv` are all words of the command line.
-std::string missing_value_error(const CLI::App& command, int argc, const char* const* argv);
+/// Returns an error message if a value is empty, as in `--db ""` or `--db=`, where CLI11 would take
+/// the next word as the value. Returns an empty text if none is. The cause is often an unset
+/// variable.
+std::string empty_value_error(int argc, const char* const* argv);
 
 /// Returns a check for numbers from `least` to `largest`. It refuses NaN.
 CLI::Validator number_between(double least, double largest);
@@ -49,8 +50,12 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
 /// command as typed. Returns kWrongUsage.
 int report_wrong_usage(const std::string& words, const std::string& message);
 
+/// Flushes `out`, which is standard output. Returns `code`, kReaderGone, or kFailed after printing
+/// "WORDS: MESSAGE" to standard error.
+int end_output(std::ostream& out, const std::string& words, int code);
+
 /// Parses the command line of a program without commands. Returns the exit code if the program must
-/// end: 0 after --help and --version, kWrongUsage after printing an error.
+/// end: that of `end_output` after --help and --version, kWrongUsage after printing an error.
 std::optional<int> parse_command_line(CLI::App& app, int argc, const char* const* argv);
 
 /// Words that complete a value, by name of the option ("--x") or of its value type ("COLUMNS").

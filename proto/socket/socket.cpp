@@ -3,6 +3,8 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstring>
+#include <stop_token>
+#include <thread>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -62,6 +64,13 @@ zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& setting
   // Maximum time of one attempt to connect. Without this limit the kernel would double the pauses
   // between its own tries, and reconnecting could take a minute after the network is back.
   constexpr int kConnectTimeout_ms = 3000;
+  // libzmq aborts if it cannot start its two threads. These two throw std::system_error instead.
+  const auto wait = [](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      std::this_thread::yield();
+    }
+  };
+  { const std::jthread first(wait), second(wait); }
   zmq::socket_t socket(context, zmq::socket_type::dealer);
   if (settings.key) {
     set_keys(socket, *settings.key);

@@ -26,7 +26,7 @@ struct DealerSettings {
 
 /// Makes a DEALER socket with the options that all our sockets share (limits.h, the maximum frame
 /// size). It does not connect yet. Throws solver::InputError if `url` is invalid or the key is a
-/// server's key.
+/// server's key, and std::system_error if the process cannot start the threads of libzmq.
 zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings);
 
 /// Starts to connect in the background, and again whenever a connection ends. A host name is

@@ -26,6 +26,9 @@ constexpr const char* kWayOut =
   if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
     reason += kWayOut;
   }
+  if (sqlite3_system_errno(database) == EFBIG) {
+    reason += ": the limit on file sizes (ulimit -f) is reached";
+  }
   throw StorageError("the database failed: " + reason);
 }
 

@@ -2,6 +2,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -14,7 +15,6 @@
 #include <type_traits>
 
 #include <fcntl.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <spdlog/fmt/fmt.h>
@@ -54,16 +54,6 @@ struct Options {
   double drain_s = 5.0;
   oblique::protocol::LogSettings log;
 };
-
-/// Raises the limit on open descriptors, because each connection needs one and the default is low.
-void take_all_descriptors() {
-  rlimit limit{};
-  if (getrlimit(RLIMIT_NOFILE, &limit) == 0) {
-    limit.rlim_cur = limit.rlim_max;
-    // An error is ignored: with the lower limit, fewer connections are possible.
-    static_cast<void>(setrlimit(RLIMIT_NOFILE, &limit));
-  }
-}
 
 /// Returns "" if the text is -1 or an open descriptor, else an error message.
 std::string descriptor_error(const std::string& text) {
@@ -109,12 +99,11 @@ void notify(Notifier& notifier, const LoopState& state, std::chrono::millisecond
 int run(LoopSettings settings, int ready_fd, pid_t parent) {
   Notifier notifier;
   oblique::protocol::StopSignals stop;  // must be created before any thread starts
-  oblique::protocol::survive_failed_writes();
+  std::signal(SIGPIPE, SIG_IGN);        // makes writes to closed pipes return an error
   if (!oblique::protocol::stop_with_parent(parent)) {
     spdlog::warn("the parent process ended before this one started");
     return oblique::protocol::kDone;
   }
-  take_all_descriptors();
   settings.on_turn = [&notifier, drain = settings.drain](const LoopState& state) {
     notify(notifier, state, drain);
   };
@@ -224,7 +213,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
   }
   if (configuration.is_to_be_printed()) {
     std::cout << configuration.printed();
-    return oblique::protocol::kDone;
+    return oblique::protocol::end_output(std::cout, app.get_name(), oblique::protocol::kDone);
   }
   loop.worker_port = options.worker_port == 0 ? "*" : std::to_string(options.worker_port);
   loop.client_port = options.client_port == 0 ? "*" : std::to_string(options.client_port);
@@ -238,6 +227,7 @@ std::optional<int> finish_options(const CLI::App& app, const Configuration& conf
 }  // namespace
 
 int main(int argc, char** argv) {
+  oblique::protocol::prepare_process(RLIM_INFINITY);  // each connection needs a file
   if (argc == 3 && std::string_view(argv[1]) == oblique::server::kReadMode) {
     return oblique::server::run_reader_program(argv[2]);
   }
@@ -268,7 +258,7 @@ int main(int argc, char** argv) {
     oblique::protocol::set_up_log(kProgram, options.log);
     return run(options.loop, options.ready_fd, parent);
   } catch (const std::exception& error) {
-    spdlog::error("{}", error.what());
+    spdlog::error("{}", oblique::protocol::failure_text(error));
     return oblique::protocol::kFailed;
   }
 }

@@ -62,8 +62,6 @@ void confine() {
   constexpr rlim_t kLargestFile = 64U << 20U;
   constexpr int kNiceness = 5;  // lower priority than the server and the workers
   check_call(prctl(PR_SET_PDEATHSIG, SIGKILL) == 0, "prctl");
-  // A write beyond the size limit returns an error instead of raising a signal.
-  std::signal(SIGXFSZ, SIG_IGN);
   limit(RLIMIT_AS, mapped_bytes() + static_cast<rlim_t>(kHeapBytes) + kOwnBytes);
   limit(RLIMIT_FSIZE, kLargestFile);
   limit(RLIMIT_CORE, 0);

@@ -186,8 +186,6 @@ TEST(EveryCommand, RefusesInvalidAndEmptyValuesOfFlags) {
       expect_wrong_usage(with(called, {flag, ""}), flag);
       expect_wrong_usage(with(with(command.words, {flag + "="}), needed_words(command)),
                          flag + ": the value is empty");
-      expect_wrong_usage(with(with(command.words, {flag, "--quiet"}), needed_words(command)),
-                         flag + ": the value is missing");
       if (checked.contains(value)) {
         expect_wrong_usage(with(called, {flag, "vorhanden"}), "vorhanden");
       }
@@ -204,10 +202,6 @@ TEST(EveryCommand, RefusesEmptyValuesOfSwitches) {
                          flag + ": the value is empty");
     }
   }
-}
-
-TEST(Flags, AcceptAValueThatBeginsWithHyphensAfterAnEqualsSign) {
-  expect_wrong_usage({"status", "--server=--quiet"}, "--quiet");
 }
 
 TEST(Flags, OfParametersRefuseValuesOutsideTheirRange) {

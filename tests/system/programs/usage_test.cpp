@@ -95,7 +95,6 @@ TEST(UsageTest, EveryFlagOfServerAndWorkerRefusesAnEmptyValue) {
     for (const std::string& flag : flags) {
       expect_refused(folder, program, {flag, ""});
       expect_refused(folder, program, {flag + "=", "--print-config"});
-      expect_refused(folder, program, {flag, "--print-config"});
     }
   }
 }
