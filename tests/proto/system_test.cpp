@@ -84,11 +84,11 @@ TEST_F(ControlGroups, LimitMemoryByTheSmallestOfTheProcessGroupAndItsParents) {
 }
 
 /// Calls `check` while the affinity mask of this thread has the first `allowed` of its processors.
-void with_processors(int allowed, const std::function<void()>& check) {
+void with_processors(std::size_t allowed, const std::function<void()>& check) {
   cpu_set_t mask;
   ASSERT_EQ(sched_getaffinity(0, sizeof mask, &mask), 0);
   const cpu_set_t before = mask;
-  for (int i = 0, kept = 0; i < CPU_SETSIZE; ++i) {
+  for (std::size_t i = 0, kept = 0; i < CPU_SETSIZE; ++i) {
     if (CPU_ISSET(i, &mask) && ++kept > allowed) {
       CPU_CLR(i, &mask);
     }
