@@ -100,9 +100,9 @@ int report_wrong_usage(const std::string& words, const std::string& message) {
 
 int end_output(std::ostream& out, const std::string& words, int code) {
   const bool failed_before = !out;
-  out.clear();  // the next write gives the reason again
-  errno = 0;
-  if (out.flush() && !failed_before) {
+  out.clear();
+  errno = 0;  // after a failure the next write fails again and sets it
+  if (out << (failed_before ? "\n" : "") << std::flush && !failed_before) {
     return code;
   }
   if (errno == EPIPE) {
