@@ -55,7 +55,7 @@ std::string environment_value(const std::string& name) {
 }
 
 void prepare_process(rlim_t wanted_files) {
-  int null = ::open("/dev/null", O_RDWR);
+  int null = STDIN_FILENO;
   while (null >= 0 && null <= STDERR_FILENO) {
     null = ::open("/dev/null", O_RDWR);
   }
@@ -64,13 +64,12 @@ void prepare_process(rlim_t wanted_files) {
   std::set_terminate(end_process);
   rlimit files{};
   constexpr rlim_t kLeastFiles = 64;
-  if (getrlimit(RLIMIT_NOFILE, &files) == 0) {
-    files.rlim_cur = std::max(files.rlim_cur, std::min(wanted_files, files.rlim_max));
-    if (setrlimit(RLIMIT_NOFILE, &files) == 0 && files.rlim_cur < kLeastFiles) {
-      dprintf(STDERR_FILENO, "%s: the limit on open files (ulimit -n) is %d; %d are needed\n",
-              program_invocation_short_name, static_cast<int>(files.rlim_cur), int{kLeastFiles});
-      _exit(1);
-    }
+  static_cast<void>(getrlimit(RLIMIT_NOFILE, &files));
+  files.rlim_cur = std::max(files.rlim_cur, std::min(wanted_files, files.rlim_max));
+  if (setrlimit(RLIMIT_NOFILE, &files) == 0 && files.rlim_cur < kLeastFiles) {
+    dprintf(STDERR_FILENO, "%s: the limit on open files (ulimit -n) is %d; %d are needed\n",
+            program_invocation_short_name, static_cast<int>(files.rlim_cur), int{kLeastFiles});
+    _exit(1);
   }
 }
 

@@ -108,9 +108,7 @@ int end_output(std::ostream& out, const std::string& words, int code) {
   if (errno == EPIPE) {
     return kReaderGone;
   }
-  std::cerr << words
-            << ": standard output could not be written: " << std::strerror(errno != 0 ? errno : EIO)
-            << '\n';
+  std::cerr << words << ": standard output could not be written: " << std::strerror(errno) << '\n';
   return kFailed;
 }
 

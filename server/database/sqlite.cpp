@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include <sys/resource.h>
 #include <zlib.h>
 
 namespace oblique::server {
@@ -26,10 +27,18 @@ constexpr const char* kWayOut =
   if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
     reason += kWayOut;
   }
-  if (sqlite3_system_errno(database) == EFBIG) {
-    reason += ": the limit on file sizes (ulimit -f) is reached";
-  }
   throw StorageError("the database failed: " + reason);
+}
+
+/// Returns SQLite's message for the last error, with the cause if a write reached a limit.
+std::string error_text(sqlite3* database) {
+  const int code = sqlite3_extended_errcode(database);
+  const bool is_write = code == SQLITE_IOERR_WRITE || code == SQLITE_IOERR_SHMSIZE;
+  rlimit size{};
+  return std::string(sqlite3_errmsg(database)) +
+         (is_write && getrlimit(RLIMIT_FSIZE, &size) == 0 && size.rlim_cur != RLIM_INFINITY
+              ? ": the limit on file sizes (ulimit -f) is reached"
+              : "");
 }
 
 /// Computes the CRC-32 of bytes that are added in small pieces. Buffers the pieces, because one
@@ -134,12 +143,9 @@ DatabaseHandle open_database(const std::string& path, int flags) {
 }
 
 void execute(sqlite3* database, const std::string& sql) {
-  char* message = nullptr;
-  const int code = sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &message);
+  const int code = sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr);
   if (code != SQLITE_OK) {
-    const std::string reason = message != nullptr ? message : sqlite3_errmsg(database);
-    sqlite3_free(message);
-    fail(database, code, reason);
+    fail(database, code, error_text(database));
   }
 }
 
@@ -187,7 +193,7 @@ bool Statement::step() {
     return true;
   }
   if (code != SQLITE_DONE) {
-    const std::string reason = sqlite3_errmsg(database_);
+    const std::string reason = error_text(database_);
     reset();
     fail(database_, code, reason);
   }
@@ -247,7 +253,7 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
     const int code = sqlite3_errcode(database);
     throw StorageError(code == SQLITE_NOTADB
                            ? path + " is not a database"
-                           : "cannot read the database " + path + ": " + sqlite3_errmsg(database) +
+                           : "cannot read the database " + path + ": " + error_text(database) +
                                  (code == SQLITE_CORRUPT ? kWayOut : ""));
   }
   if (application_id == 0 && version == 0 && !has_tables) {

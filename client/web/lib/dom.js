@@ -85,8 +85,7 @@ export const command = (name, text) =>
 
 const focusable = "a[href], button, input, select, [tabindex]";
 const containers = ["THEAD", "TBODY", "TR"];
-// Elements of these kinds may differ although isEqualNode() finds them equal: it compares attributes,
-// and the value of an input or the pixels of a canvas are none.
+// isEqualNode() compares attributes, not the value of an input or the pixels of a canvas.
 const withState = "input, select, canvas";
 
 /**
