@@ -293,11 +293,10 @@ void EmbeddedService::stop() {
 }
 
 void add_worker_flags(CLI::App& command, RunSettings& settings) {
-  constexpr int kMaxWorkers = 1024;
   command
       .add_option("--workers", settings.service.workers,
                   "number of worker processes, which share the cores of this machine")
-      ->check(CLI::Range(1, kMaxWorkers).description(""))
+      ->check(CLI::Range(1, 1024).description(""))
       ->type_name("N")
       ->capture_default_str();
   command
