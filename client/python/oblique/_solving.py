@@ -137,7 +137,7 @@ def _keys(
     common shape. Warns of values that are probably in another unit. ``one_for`` is the name of a
     function that takes one value per key."""
     keys: dict[str, Any] = {**values, "preset": preset}
-    arrays = {key: _array(key, v) for key, v in values.items() if not isinstance(v, str)}
+    arrays = {key: _array(key, v) for key, v in values.items() if not (isinstance(v, str) and v)}
     for key, array in arrays.items():
         if one_for and array.ndim:
             raise ValueError(
@@ -182,7 +182,7 @@ def _without_masks(value: Any) -> Any:
 
 def _array(name: str, value: Any) -> npt.NDArray[Any]:
     array = np.asarray(_without_masks(value))
-    if name == "integrator" and array.dtype.kind == "U":
+    if name == "integrator" and array.dtype.kind == "U" and str(value):
         return array
     if array.dtype.kind == "O" and None not in array.ravel().tolist():
         try:

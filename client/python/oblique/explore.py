@@ -38,7 +38,7 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     a value; None and False leave it out. Raises ValueError for wrong usage and RuntimeError for
     other failures, with the sentences of the program.
     """
-    words = [program(), verb, "--format", "json", "--quiet", *([] if study is None else [study])]
+    words = [program(), verb, *([] if study is None else [study]), "--format", "json", "--quiet"]
     for name, value in flags.items():
         flag = "--" + name.replace("_", "-")
         for each in value if isinstance(value, (list, tuple)) else [value]:

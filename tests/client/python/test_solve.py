@@ -73,6 +73,8 @@ def test_results_show_what_they_are():
         ({"I": "A^2 / (4 * p)"}, 'I = "A^2 / (4 * p)": unknown key `p`'),
         ({"mu": 10**400}, "is not allowed: mu must be a number"),
         ({"mu": True}, "mu = True is not allowed: mu must be a number"),
+        ({"H": ""}, "H = '' is not allowed: H must be a number"),
+        ({"integrator": ""}, "integrator = '' is not allowed"),
         ({"preset": None}, "preset = None is not allowed"),
         ({"lengths": []}, "lengths must be the length of each link"),
         ({"lengths": [0.5], "links": "2"}, "lengths cannot be combined with links or length"),
