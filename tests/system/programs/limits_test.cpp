@@ -108,7 +108,8 @@ void expect_no_abort(const Outcome& ended, const std::string& line) {
 #ifndef __SANITIZE_ADDRESS__
 TEST_F(LimitsTest, LittleAddressSpaceEndsAProgramWithASentence) {
   int failures = 0;
-  for (int space_kB = 15'000; space_kB <= 75'000; space_kB += 5'000) {
+  // With less than about 25 MB memory may run out before main, where no program can handle it.
+  for (const int space_kB : {35'000, 40'000, 45'000, 50'000, 61'440, 70'000}) {
     const std::string limit = "ulimit -v " + std::to_string(space_kB) + "; ";
     for (const std::string& words :
          {worker_ + " --server tcp://127.0.0.1:1 --idle-exit 0.05",
@@ -119,7 +120,7 @@ TEST_F(LimitsTest, LittleAddressSpaceEndsAProgramWithASentence) {
       failures += ended.exit_code == 1 ? 1 : 0;
     }
   }
-  EXPECT_GT(failures, 10);
+  EXPECT_GT(failures, 10) << "out of 24; status and the worker fail always";
 }
 #endif
 
