@@ -10,7 +10,7 @@
 namespace oblique::protocol {
 
 /// Version of the protocol. A peer of another version is refused; the reason names both versions.
-inline constexpr std::uint32_t kProtocolVersion = 8;
+inline constexpr std::uint32_t kProtocolVersion = 9;
 
 /// Maximum size of a frame that the server or a peer accepts [bytes].
 inline constexpr std::size_t kMaxFrameBytes = std::size_t{16} * 1024 * 1024;

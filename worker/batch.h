@@ -19,11 +19,13 @@ class Batch {
     std::uint64_t end;
   };
   /// `number` is unique in this worker. Lease numbers are not: a restarted server repeats them.
+  /// `attempt` counts the leases of the points.
   Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Range>& ranges,
-        std::shared_ptr<const protocol::PointTable> points);
+        std::shared_ptr<const protocol::PointTable> points, std::uint32_t attempt = 1);
 
   std::uint64_t number() const { return number_; }
   std::uint64_t study_id() const { return study_id_; }
+  std::uint32_t attempt() const { return attempt_; }
   const protocol::PointTable& points() const { return *points_; }
 
   std::uint64_t size() const { return size_; }
@@ -50,6 +52,7 @@ class Batch {
   std::vector<Run> runs_;  ///< runs of consecutive points; each ends where the next begins
   std::uint64_t size_ = 0;
   std::shared_ptr<const protocol::PointTable> points_;
+  std::uint32_t attempt_;
 };
 
 /// The ranges of a message. Returns nothing if a range is empty or not within a study of
@@ -65,6 +68,7 @@ struct Progress {
   double busy_s = 0.0;                      ///< time spent on the results
   bool batch_done = false;                  ///< the batch has no further points
   std::vector<Batch::Range> left_out = {};  ///< points that did not pass the filter
+  std::uint32_t attempt = 1;                ///< attempt of the batch
 };
 
 }  // namespace oblique::worker

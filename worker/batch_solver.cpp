@@ -5,6 +5,7 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "proto/recipe/point_table.h"
 #include "proto/result_message.h"
@@ -14,15 +15,25 @@ namespace oblique::worker {
 
 class BatchSolver::Task : public solver::PointSource {
  public:
-  Task(BatchSolver& solver, OpenBatch& open) : solver_(solver), open_(open), batch_(open.batch) {}
+  Task(BatchSolver& solver, OpenBatch& open, SolvingSlot& solving)
+      : solver_(solver), open_(open), batch_(open.batch), solving_(solving) {
+    solving_.study_id = batch_.study_id();
+  }
 
   std::optional<std::uint64_t> next() override {
+    if (std::exchange(falls_, 0) > 0) {
+      solving_.end_falls();
+    }
     do {
       const std::uint64_t found = batch_.first_to_solve(next_, end_);
       batch_.append_points(next_, found, left_out_);
       next_ = found;
       if (next_ < end_) {
-        return open_.dropped ? std::nullopt : std::optional(next_++);
+        if (open_.dropped) {
+          return std::nullopt;
+        }
+        solving_.begin(batch_.point_at(next_));
+        return next_++;
       }
     } while (take_more());
     return std::nullopt;
@@ -36,6 +47,9 @@ class BatchSolver::Task : public solver::PointSource {
     return {point.model, {point.H_m, point.mu, point.e_star}};
   }
   Run run_of(std::uint64_t position) override {
+    if (falls_++ < SolvingSlot::kMostFalls) {
+      solving_.begin_fall(batch_.point_at(position));
+    }
     const auto next = batch_.first_to_solve(batch_.end_of_model(position), batch_.size());
     return {batch_.points().segment_at(batch_.point_at(position)).model,
             next < batch_.size() ? std::optional(next) : std::nullopt};
@@ -50,6 +64,7 @@ class BatchSolver::Task : public solver::PointSource {
     results_.push_back(outcome.result ? protocol::to_message(number, *outcome.result)
                                       : protocol::failed_point(number, outcome.error));
     protocol::set_inputs(results_.back(), batch_.points());
+    solving_.end(number);
     if (Clock::now() - busy_since_ > kLongestWait) {
       const std::lock_guard lock(solver_.mutex_);
       pass_on();
@@ -98,6 +113,8 @@ class BatchSolver::Task : public solver::PointSource {
   BatchSolver& solver_;
   OpenBatch& open_;  ///< the batch is not removed while a thread works on it
   const Batch& batch_;
+  SolvingSlot& solving_;
+  std::size_t falls_ = 0;                        ///< number of runs whose falls are solved ahead
   std::uint64_t next_ = 0;                       ///< position of the next point
   std::uint64_t end_ = 0;                        ///< position after the last point of this part
   std::vector<protocol::PointResult> results_;   ///< not yet moved to the solver
@@ -105,10 +122,15 @@ class BatchSolver::Task : public solver::PointSource {
   Clock::time_point busy_since_ = Clock::now();  ///< start of the work on these results
 };
 
-BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads)
+BatchSolver::BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads,
+                         std::span<SolvingSlot> slots)
     : solve_(std::move(solve)), batch_ended_(std::move(batch_ended)), thread_count_(threads) {
   for (std::size_t i = 0; i < thread_count_; ++i) {
-    threads_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+    SolvingSlot* const shared = slots.empty() ? nullptr : &slots[i + 1];
+    threads_.emplace_back([this, shared](const std::stop_token& stop) {
+      SolvingSlot own{};
+      work(stop, shared == nullptr ? own : *shared);
+    });
   }
 }
 
@@ -178,7 +200,10 @@ std::vector<Progress> BatchSolver::collect() {
 }
 
 Progress& BatchSolver::progress_of(const Batch& batch) {
-  return progress_.try_emplace(batch.number(), Progress{batch.number(), batch.study_id()})
+  return progress_
+      .try_emplace(batch.number(), Progress{.batch = batch.number(),
+                                            .study_id = batch.study_id(),
+                                            .attempt = batch.attempt()})
       .first->second;
 }
 
@@ -189,11 +214,11 @@ BatchSolver::OpenBatches::iterator BatchSolver::next_batch() {
   });
 }
 
-void BatchSolver::work(const std::stop_token& stop) {
+void BatchSolver::work(const std::stop_token& stop, SolvingSlot& solving) {
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !paused_ && next_batch() != open_.end(); })) {
     const auto open = next_batch();
-    Task task(*this, *open);
+    Task task(*this, *open, solving);
     ++open->solvers;
     lock.unlock();
     solve_(open->batch, task, [&](solver::Outcome&& outcome) { task.take(std::move(outcome)); });

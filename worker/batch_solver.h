@@ -8,6 +8,7 @@
 #include <list>
 #include <map>
 #include <mutex>
+#include <span>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -16,6 +17,7 @@
 #include "worker/batch.h"
 #include "worker/solver/point_runs.h"
 #include "worker/solver/solve.h"
+#include "worker/solving_slot.h"
 
 namespace oblique::worker {
 
@@ -29,8 +31,10 @@ class BatchSolver {
       std::function<void(const Batch&, solver::PointSource&, const solver::TakeOutcome&)>;
 
   /// A solving thread calls `batch_ended` after the last point of a batch. `batch_ended` must not
-  /// call this object.
-  BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads = 1);
+  /// call this object. Records the points being solved in
+  /// `slots`: thread i in slot i + 1. `slots` may be empty.
+  BatchSolver(SolvePoints solve, std::function<void()> batch_ended, std::size_t threads = 1,
+              std::span<SolvingSlot> slots = {});
 
   /// Waits for the points that are being solved.
   ~BatchSolver();
@@ -64,7 +68,7 @@ class BatchSolver {
   using OpenBatches = std::list<OpenBatch>;
   class Task;  ///< the points that one thread solves, part by part
 
-  void work(const std::stop_token& stop);
+  void work(const std::stop_token& stop, SolvingSlot& solving);
   OpenBatches::iterator next_batch();
   void drop(const std::function<bool(const OpenBatch&)>& is_to_drop);
   Progress& progress_of(const Batch& batch);

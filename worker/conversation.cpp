@@ -321,9 +321,10 @@ void Conversation::on(const protocol::Batch& batch) {
     return;
   }
   backoff_ms_ = 0;
-  held_[next_batch_] = {batch.study_id(), batch.lease_id(), batch.attempt()};
+  held_[next_batch_] = {batch.study_id(), batch.lease_id()};
   last_work_ms_ = now_ms_;
-  effects_.emplace_back(Solve{Batch(next_batch_++, batch.study_id(), *ranges, study->second)});
+  effects_.emplace_back(
+      Solve{Batch(next_batch_++, batch.study_id(), *ranges, study->second, batch.attempt())});
 }
 
 void Conversation::on(const protocol::ResultsStored& stored) {
@@ -372,12 +373,12 @@ void Conversation::report(Progress& progress) {
   }
   const auto found = held_.find(progress.batch);
   const bool has_lease = found != held_.end();  // false for batches of an earlier session
-  const Held held = has_lease ? found->second : Held{progress.study_id, 0, 0};
+  const Held held = has_lease ? found->second : Held{progress.study_id, 0};
   const auto new_message = [&] {
     protocol::Results results;
     results.set_study_id(held.study_id);
     results.set_lease_id(held.lease_id);
-    results.set_attempt(held.attempt);
+    results.set_attempt(progress.attempt);
     return results;
   };
   const double s_per_point = progress.results.empty()

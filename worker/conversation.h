@@ -183,7 +183,6 @@ class Conversation {
   struct Held {
     std::uint64_t study_id;
     std::uint64_t lease_id;
-    std::uint32_t attempt;
   };
 
   void connect(const std::string& reason);

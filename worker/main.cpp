@@ -33,6 +33,7 @@
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/point_runs.h"
 #include "worker/solver/solve.h"
+#include "worker/supervisor.h"
 #include "worker/trace_solver.h"
 
 namespace {
@@ -113,17 +114,12 @@ std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
                             exit.until, kTimeToStop_s);
 }
 
-int run_worker(Options options) {
-  SessionSettings& settings = options.session;
+/// Solves until the worker is stopped. Runs in the child of the process that the user started.
+int run_worker(SessionSettings& settings, std::uint64_t fall_memory_bytes,
+               oblique::protocol::StopSignals& stop) {
   oblique::protocol::Notifier notifier;
-  oblique::protocol::StopSignals stop;  // must be constructed before any thread starts
-  std::signal(SIGPIPE, SIG_IGN);        // makes writes to closed pipes return an error
-  if (!oblique::protocol::stop_with_parent(options.parent)) {
-    spdlog::warn("the parent process ended before this one started");
-    return oblique::protocol::kDone;
-  }
-  oblique::solver::FallCache falls(options.fall_memory_bytes != 0
-                                       ? options.fall_memory_bytes
+  oblique::solver::FallCache falls(fall_memory_bytes != 0
+                                       ? fall_memory_bytes
                                        : oblique::protocol::available_memory_bytes() /
                                              oblique::solver::kFallsPartOfMemory);
   settings.on_turn = [&](const std::string& status) {
@@ -136,7 +132,10 @@ int run_worker(Options options) {
         oblique::solver::solve_points_of_models(points, falls, batch.points().wants_errors(), take);
       },
       [&](const auto& order, const auto& sink) {
-        return oblique::worker::solve_trace(order, sink, falls);
+        settings.slots.front().begin(0);
+        auto result = oblique::worker::solve_trace(order, sink, falls);
+        settings.slots.front().end(0);
+        return result;
       });
   spdlog::info("worker {}, solver {} ({}), threads {}, server {}", settings.name,
                oblique::solver::solver_version(), oblique::solver::instruction_set(),
@@ -153,6 +152,22 @@ int run_worker(Options options) {
     std::_Exit(exit_code);
   }
   return exit_code;
+}
+
+/// Runs the worker in a child process, which is replaced when it crashes.
+int run_supervised(Options& options) {
+  oblique::protocol::StopSignals stop;  // must be constructed before any thread starts
+  std::signal(SIGPIPE, SIG_IGN);        // makes writes to closed pipes return an error
+  if (!oblique::protocol::stop_with_parent(options.parent)) {
+    spdlog::warn("the parent process ended before this one started");
+    return oblique::protocol::kDone;
+  }
+  SessionSettings& settings = options.session;
+  settings.slots = oblique::worker::make_shared_slots(settings.threads);
+  return oblique::worker::supervise(stop, settings.slots, [&](const auto& hello) {
+    settings.hello = hello;
+    return run_worker(settings, options.fall_memory_bytes, stop);
+  });
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -226,7 +241,7 @@ int run_program(int argc, char** argv) {
     if (!options.keys.empty()) {
       session.key = oblique::protocol::read_key_file(options.keys);
     }
-    return run_worker(std::move(options));
+    return run_supervised(options);
   } catch (const oblique::solver::InputError& error) {
     return oblique::protocol::report_wrong_usage(app.get_name(), error.what());
   }

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <random>
 #include <utility>
 
-#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include "proto/frames.h"
@@ -23,24 +21,13 @@ std::int64_t now_ms() {
   return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::milliseconds(1);
 }
 
-/// 128 random bits in hexadecimal digits.
-std::string random_id() {
-  std::random_device source;
-  std::string digits;
-  for (int i = 0; i < 4; ++i) {
-    digits += fmt::format("{:08x}", source());
-  }
-  return digits;
-}
-
 protocol::WorkerHello hello_of(const SessionSettings& settings) {
-  protocol::WorkerHello hello;
+  protocol::WorkerHello hello = settings.hello;
   protocol::set_protocol(hello);
   hello.set_solver_version(solver::solver_version());
   hello.set_instruction_set(solver::instruction_set());
   hello.set_name(settings.name);
   hello.set_threads(static_cast<std::uint32_t>(settings.threads));
-  hello.set_process_id(random_id());
   hello.set_host(settings.host);
   return hello;
 }
@@ -58,7 +45,7 @@ Session::Session(SessionSettings settings, BatchSolver::SolvePoints solve, Trace
     : settings_(std::move(settings)),
       conversation_(hello_of(settings_), settings_.conversation, settings_.server),
       solver_(
-          std::move(solve), [this] { news_.wake(); }, settings_.threads),
+          std::move(solve), [this] { news_.wake(); }, settings_.threads, settings_.slots),
       tracer_(std::move(trace), [this] { news_.wake(); }) {}
 
 int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <zmq.hpp>
@@ -22,6 +23,8 @@ struct SessionSettings {
   std::string server = "tcp://127.0.0.1:7601";  ///< the server's address for workers
   std::string name;                             ///< name of the worker, in lists
   std::string host;                             ///< name of this machine, in lists
+  protocol::WorkerHello hello;                  ///< identifies this process and the one before it
+  std::span<SolvingSlot> slots = {};            ///< from make_shared_slots; may be empty
   std::size_t threads = 1;                      ///< number of solving threads
   /// Called several times a second with the state in words.
   std::function<void(const std::string& status)> on_turn;

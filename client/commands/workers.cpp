@@ -57,22 +57,18 @@ void note_access(Console& console, const protocol::WorkersReply& reply) {
   }
 }
 
-std::string standing_of(const protocol::WorkerStatus& worker) {
-  return worker.set_aside() ? "set aside" : worker.proven() ? "proven" : "new";
-}
-
 /// Returns all columns, for programs.
 protocol::Table full_table(const protocol::WorkersReply& reply) {
   protocol::Table table{.columns = {"worker", "name", "threads", "instruction_set",
                                     "solver_version", "leased_points", "solved_points", "silent_ms",
-                                    "losses", "standing", "host", "points_per_s", "state", "key"}};
+                                    "losses", "host", "points_per_s", "state", "key"}};
   const auto number = [](auto value) { return static_cast<std::int64_t>(value); };
   for (const auto& worker : reply.workers()) {
     table.rows.push_back({number(worker.worker_id()), worker.name(), number(worker.threads()),
                           worker.instruction_set(), worker.solver_version(),
                           number(worker.leased_points()), number(worker.solved_points()),
-                          number(worker.silent_ms()), number(worker.losses()), standing_of(worker),
-                          worker.host(), worker.points_per_s(), worker.state(), worker.key()});
+                          number(worker.silent_ms()), number(worker.losses()), worker.host(),
+                          worker.points_per_s(), worker.state(), worker.key()});
   }
   return table;
 }

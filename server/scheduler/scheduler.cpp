@@ -67,8 +67,7 @@ void Scheduler::on(const StudyAdded& event) {
   if (studies_.contains(event.study)) {
     return;
   }
-  studies_.emplace(event.study, Study{StudyPoints(event.table, event.completed, event.left_out,
-                                                  settings_.loss_limits),
+  studies_.emplace(event.study, Study{StudyPoints(event.table, event.completed, event.left_out),
                                       event.failed, event.cancelled, event.paused, false,
                                       event.priority, 0.0, event.solver_version});
   studies_.at(event.study).held = event.held;
@@ -107,7 +106,7 @@ void Scheduler::on(Study& study, const StudyCancelled& event) {
 /// Ends all leases of a study and makes workers drop the study. No point counts as lost.
 void Scheduler::withdraw(StudyId study) {
   for (const LeaseId lease : std::set<LeaseId>(studies_.at(study).leases)) {
-    end_lease(lease, std::nullopt);
+    end_lease(lease);
   }
   for (auto& [id, worker] : workers_) {
     if (worker.defined.erase(study) != 0) {
@@ -137,14 +136,7 @@ void Scheduler::on(Study& study, const PriorityChanged& event) {
 
 void Scheduler::on(Study& study, const FailuresForgotten& event) {
   // Ends old leases of the failed points, which may still run, before the points get a new lease.
-  const IntervalSet places = study.points.order().places(event.points);
-  for (const LeaseId id : std::set<LeaseId>(study.leases)) {
-    const Lease& lease = leases_.at(id);
-    if (!places.within(lease.batch.first_place, lease.batch.end()).empty()) {
-      effects_.emplace_back(ReleaseBatch{lease.worker, id});
-      end_lease(id, std::nullopt);
-    }
-  }
+  release_leases(study, study.points.order().places(event.points));
   study.failed -= std::min(study.failed, study.points.reopen(event.points));
   if (study.leases.empty() && !study.points.has_results()) {
     study.solver_version.clear();
@@ -179,8 +171,6 @@ void Scheduler::on(const StudyRemoved& event) {
   for (auto& [id, worker] : workers_) {
     worker.paces.erase(event.study);
   }
-  failing_.erase(event.study);
-  processes_.forget_study(event.study);
   if (study->second.rank) {
     free_.erase(*study->second.rank);
   }
@@ -225,7 +215,7 @@ void Scheduler::requeue(StudyId id) {
     }
     study.rank = rank;
   }
-  const bool has_suspect = is_open(study) && study.has_suspect();
+  const bool has_suspect = is_open(study) && study.points.has_suspect();
   const bool changes_suspect = has_suspect ? suspects_.insert(id).second : suspects_.erase(id) > 0;
   if ((rank && !had_free) || changes_suspect) {  // other workers may be served now
     ready_workers_.unpark_all();
@@ -249,22 +239,26 @@ void Scheduler::on(const WorkerJoined& event) {
   if (workers_.contains(event.worker)) {
     return;
   }
+  end_connection(event.process, WorkerEnd::kReplaced, "its process has a new connection");
   Worker worker{};
   worker.threads = std::max(event.threads, 1U);
   worker.last_heard_ms = now_ms_;
-  worker.process = processes_.join(event.process, event.worker);
-  threads_ += worker.threads;
-  const ProcessNumber process = worker.process;
-  workers_.emplace(event.worker, std::move(worker));
-  if (!event.process.empty()) {
-    for (const WorkerId earlier : std::set<WorkerId>(processes_.at(process).workers)) {
-      if (earlier != event.worker) {
-        remove_worker(earlier, WorkerEnd::kReplaced);
-        effects_.emplace_back(DropWorker{earlier, "its process has a new connection"});
-      }
-    }
+  worker.process = event.process;
+  const LostProcess returned = take_lost(event.process);
+  forgive(returned);
+  worker.losses = returned.losses;
+  if (event.replaced) {
+    end_connection(event.replaced->process, WorkerEnd::kLost, "its process has ended");
+    const LostProcess ended = take_lost(event.replaced->process);
+    blame(ended, *event.replaced);
+    worker.losses += ended.losses;
+    worker.is_spared = !ended.held.empty() && ended.held.front().alone;
   }
-  take_back_losses(process);
+  if (!event.process.empty()) {
+    connections_[event.process] = event.worker;
+  }
+  threads_ += worker.threads;
+  workers_.emplace(event.worker, std::move(worker));
   ready_workers_.unpark_all();
 }
 
@@ -278,10 +272,6 @@ void Scheduler::on(Worker& worker, const CreditGiven& event) {
 void Scheduler::on(Worker& worker, const HeartbeatReceived& event) {
   // A lease older than `lost_after_ms` that the heartbeat does not name never reached the worker.
   const std::set<LeaseId> held(event.leases.begin(), event.leases.end());
-  if (worker.probe != 0 && !held.contains(worker.probe) &&
-      now_ms_ - *worker.probed_ms > settings_.lost_after_ms) {
-    worker.probe = 0;
-  }
   std::vector<LeaseId> strayed;
   for (const LeaseId id : worker.leases) {
     if (!held.contains(id) && now_ms_ - leases_.at(id).granted_ms > settings_.lost_after_ms) {
@@ -289,16 +279,14 @@ void Scheduler::on(Worker& worker, const HeartbeatReceived& event) {
     }
   }
   for (const LeaseId id : strayed) {
-    end_lease(id, std::nullopt);
+    end_lease(id);
   }
 }
 
 void Scheduler::on(Worker& worker, const BatchesReturned& event) {
   for (const LeaseId lease : event.leases) {
     if (worker.leases.contains(lease)) {
-      end_lease(lease, std::nullopt);
-    } else if (lease == worker.probe) {
-      worker.probe = 0;
+      end_lease(lease);
     }
   }
 }
@@ -314,7 +302,7 @@ void Scheduler::on(const WorkerUnreachable& event) {
   }
   for (const LeaseId lease : event.unsent) {
     if (found->second.leases.contains(lease)) {
-      end_lease(lease, std::nullopt);
+      end_lease(lease);
     }
   }
   remove_worker(event.worker, WorkerEnd::kLost);
@@ -325,7 +313,6 @@ void Scheduler::on(const Tick&) {
   const std::int64_t gap_ms = last_tick_ms_ < 0 ? 0 : now_ms_ - last_tick_ms_;
   last_tick_ms_ = now_ms_;
   ready_workers_.unpark_all();  // waiting workers may be served now
-  fail_due_points();
   std::vector<WorkerId> lost;
   for (auto& [id, worker] : workers_) {
     if (gap_ms > kLongestTick_ms) {
@@ -352,21 +339,17 @@ void Scheduler::remove_worker(WorkerId id, WorkerEnd how) {
   if (found == workers_.end()) {
     return;
   }
-  const ProcessNumber process = found->second.process;
   note_end(found->second, how);
-  std::optional<Loss> loss;
-  const std::set<LeaseId> leases = found->second.leases;
-  if (how == WorkerEnd::kLost) {
-    loss = Loss{process, is_proven(found->second) && leases.size() == 1};
-  }
-  for (const LeaseId lease : leases) {
-    end_lease(lease, loss);
+  for (const LeaseId lease : std::set<LeaseId>(found->second.leases)) {
+    end_lease(lease, how == WorkerEnd::kLost);
   }
   ready_workers_.remove(id);
-  stop_draining(id);
   threads_ -= found->second.threads;
+  if (const auto known = connections_.find(found->second.process);
+      known != connections_.end() && known->second == id) {
+    connections_.erase(known);
+  }
   workers_.erase(found);
-  processes_.leave(process, id);
   ready_workers_.unpark_all();
 }
 
@@ -374,17 +357,15 @@ void Scheduler::on(const WorkerBusy& event) {
   const auto found = workers_.find(event.worker);
   if (found != workers_.end()) {
     found->second.is_busy = event.is_busy;
-    if (event.is_busy) {
-      stop_draining(event.worker);
-    }
     ready_workers_.unpark(event.worker);
   }
 }
 
 // ---- Leases and results ------------------------------------------------------------------------
 
-void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
-  const Lease lease = leases_.at(id);
+/// Ends a lease. `is_lost` is true if the worker was lost or ended the batch without answers.
+void Scheduler::end_lease(LeaseId id, bool is_lost) {
+  Lease lease = leases_.at(id);
   leases_.erase(id);
   Worker& worker = workers_.at(lease.worker);
   worker.leases.erase(id);
@@ -393,25 +374,43 @@ void Scheduler::end_lease(LeaseId id, const std::optional<Loss>& loss) {
   Study& study = studies_.at(lease.study);
   study.leases.erase(id);
   const std::vector<Interval> held = open_places(lease);
+  is_lost = is_lost && !held.empty();
+  LeaseHistory& history = lease.batch.history;
   // If another worker has a lease for the rest of this batch, that lease keeps the points.
   if (const auto twin = leases_.find(lease.twin); twin != leases_.end()) {
     twin->second.twin = 0;
-    if (loss && !held.empty()) {
-      // The points that killed one worker may kill the other too, so the other lease records the
-      // loss.
-      note_process(lease.study, loss->process);
-      twin->second.batch.losses.add({loss->process, false});
-    }
-  } else if (loss && !held.empty()) {
-    note_process(lease.study, loss->process);
-    note_loss(lease, held, *loss);
+    twin->second.batch.history.losses += is_lost ? 1U : 0U;
   } else {
-    study.points.give_back(held, lease.batch.attempts + 1, lease.batch.losses, now_ms_);
+    ++history.attempts;
+    history.losses += is_lost ? 1U : 0U;
+    history.lost_alone = is_lost && lease.alone ? history.lost_alone + 1 : 0;
+    if (history.lost_alone == 1) {
+      history.lost_alone_since_ms = now_ms_;
+    }
+    study.points.give_back(held, history);
   }
   if (study.leases.empty() && !study.points.has_results()) {
     study.solver_version.clear();
   }
   requeue(lease.study);
+  if (history.lost_alone >= settings_.failing_after &&
+      now_ms_ - history.lost_alone_since_ms >= settings_.failing_after_ms) {
+    fail_point(lease.study, study.points.order().point(lease.batch.first_place), history.attempts,
+               std::to_string(history.lost_alone) +
+                   " workers in a row were lost while they held only this point");
+  }
+}
+
+/// Makes workers drop each batch of the study with open points at these places. No point counts as
+/// lost.
+void Scheduler::release_leases(const Study& study, const IntervalSet& places) {
+  for (const LeaseId id : std::set<LeaseId>(study.leases)) {
+    const Lease& lease = leases_.at(id);
+    if (!places.within(lease.batch.first_place, lease.batch.end()).empty()) {
+      effects_.emplace_back(ReleaseBatch{lease.worker, id});
+      end_lease(id);
+    }
+  }
 }
 
 std::vector<Interval> Scheduler::open_places(const Lease& lease) const {
@@ -426,7 +425,7 @@ void Scheduler::release_if_answered(LeaseId id) {
   const auto lease = leases_.find(id);
   if (lease != leases_.end() && !has_open_points(lease->second)) {
     effects_.emplace_back(ReleaseBatch{lease->second.worker, id});
-    end_lease(id, std::nullopt);
+    end_lease(id);
   }
 }
 
@@ -454,11 +453,12 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
     }
     if (!store.accepted.empty() || !store.left_out.empty()) {
       worker.stored_ms = now_ms_;
+      worker.stalled_until_ms = 0;
     }
     requeue(event.study);
     update_pace(worker, event);
   }
-  note_answers(worker, event, !store.accepted.empty());
+  const bool is_empty = event.outcomes.empty() && store.left_out.empty();
   effects_.emplace_back(std::move(store));
   const auto lease = leases_.find(event.lease);
   if (lease == leases_.end() || lease->second.worker != event.worker ||
@@ -467,11 +467,15 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   }
   const LeaseId twin = lease->second.twin;
   if (event.batch_done) {
-    const bool is_solved = is_proven(worker) && !has_open_points(lease->second);
+    const bool is_solved = !has_open_points(lease->second);
     worker.solved_batches += is_solved ? 1U : 0U;
+    worker.losses += is_solved ? 0U : 1U;
     // Points without an answer in a finished batch count as lost. Otherwise a worker that never
     // answers them would get them again and again.
-    end_lease(event.lease, Loss{kNoProcess, is_proven(worker) && worker.leases.size() == 1});
+    end_lease(event.lease, !is_solved);
+    if (!is_solved && is_empty) {
+      stall(worker, settings_.shortest_stall_ms);
+    }
   }
   release_if_answered(twin);
 }
@@ -549,17 +553,17 @@ StudyCounts Scheduler::study(StudyId id) const {
           study.solver_version, !is_current(study) && !points.is_complete()};
 }
 
-bool Scheduler::sets_all_aside() const {
+bool Scheduler::are_all_stalled() const {
   return std::ranges::all_of(workers_,
-                             [this](const auto& entry) { return is_set_aside(entry.second); });
+                             [this](const auto& entry) { return is_stalled(entry.second); });
 }
 
 WorkerState Scheduler::state_of(const Worker& worker, std::int64_t now_ms) const {
   constexpr std::int64_t kSilentAfter_ms = 1500;
   return now_ms - worker.last_heard_ms > kSilentAfter_ms ? WorkerState::kSilent
-         : is_set_aside(worker)                          ? WorkerState::kSetAside
+         : is_stalled(worker)                            ? WorkerState::kStalled
          : worker.is_busy                                ? WorkerState::kBusy
-         : !worker.leases.empty() || worker.probe != 0   ? WorkerState::kWorking
+         : !worker.leases.empty()                        ? WorkerState::kWorking
                                                          : WorkerState::kIdle;
 }
 
@@ -579,12 +583,7 @@ std::int64_t Scheduler::silent_ms(WorkerId id, std::int64_t now_ms) const {
 
 WorkerCounts Scheduler::worker(WorkerId id, std::int64_t now_ms) const {
   const Worker& worker = workers_.at(id);
-  WorkerCounts counts{0,
-                      worker.solved_points,
-                      silent_ms(id, now_ms),
-                      processes_.at(worker.process).losses,
-                      is_proven(worker),
-                      is_set_aside(worker),
+  WorkerCounts counts{0, worker.solved_points, silent_ms(id, now_ms), worker.losses,
                       state_of(worker, now_ms)};
   for (const LeaseId lease : worker.leases) {
     counts.leased_points += size_of(open_places(leases_.at(lease)));

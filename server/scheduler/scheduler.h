@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <optional>
 #include <set>
@@ -14,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "server/scheduler/losses.h"
 #include "server/scheduler/scheduler_events.h"
 #include "server/scheduler/study_points.h"
 
@@ -37,13 +35,13 @@ struct StudyCounts {
 
 /// State of a worker. If several apply, the first one counts.
 enum class WorkerState {
-  kSilent,    ///< has sent nothing for 1.5 s; heartbeats come every 900 ms
-  kSetAside,  ///< gets no batch until it has solved a probe
-  kBusy,      ///< does not read its messages
-  kWorking,   ///< holds a batch or a probe
+  kSilent,   ///< has sent nothing for 1.5 s; heartbeats come every 900 ms
+  kStalled,  ///< stored nothing for too long, so it gets no batch for a while
+  kBusy,     ///< does not read its messages
+  kWorking,  ///< holds a batch
   kIdle,
 };
-inline constexpr std::array kWorkerStates{"silent", "set aside", "busy", "working", "idle"};
+inline constexpr std::array kWorkerStates{"silent", "stalled", "busy", "working", "idle"};
 
 /// Number of workers in one state, and the number of their threads.
 struct WorkerGroup {
@@ -57,8 +55,6 @@ struct WorkerCounts {
   std::uint64_t solved_points;
   std::int64_t silent_ms;
   std::uint64_t losses;  ///< number of leases of the worker's process that ended without an answer
-  bool is_proven;        ///< true if the worker's process has solved leased points
-  bool is_set_aside;
   WorkerState state;
 };
 
@@ -126,8 +122,8 @@ class Scheduler {
 
   /// Throws std::out_of_range for an unknown study.
   StudyCounts study(StudyId study) const;
-  /// Returns whether every worker must solve a probe before it gets points; true without workers.
-  bool sets_all_aside() const;
+  /// Returns whether no worker may get points.
+  bool are_all_stalled() const;
   /// Returns the number of workers in each WorkerState.
   WorkerGroups groups(std::int64_t now_ms) const;
   /// Number of leased batches.
@@ -161,16 +157,12 @@ class Scheduler {
     std::set<LeaseId> leases{};
     bool held = false;
     std::optional<Rank> rank{};  ///< the study's entry in `free_`
-
-    bool has_suspect() const {
-      return points.has(Suspicion::kSuspect) || points.has(Suspicion::kRisky);
-    }
   };
   struct Lease {
     WorkerId worker;
     StudyId study;
     Batch batch;
-    bool alone;  ///< true if the points are suspect; the worker then gets no other lease
+    bool alone;  ///< true for a suspect point; the worker then gets no other lease
     std::int64_t granted_ms;
     LeaseId twin = 0;  ///< another worker's lease for the rest of this batch; 0 if there is none
   };
@@ -192,10 +184,12 @@ class Scheduler {
   struct Worker {
     std::uint32_t threads;
     std::uint32_t credit = 0;
-    bool is_busy = false;  ///< the worker does not read its messages, so it gets no batch
-    ProcessNumber process = kNoProcess;
-    LeaseId probe = 0;                        ///< lease of the worker's probe; 0 without a probe
-    std::optional<std::int64_t> probed_ms{};  ///< time at which the worker got its last probe
+    bool is_busy = false;      ///< the worker does not read its messages, so it gets no batch
+    std::string process;       ///< ID of its process; empty if unknown
+    std::uint64_t losses = 0;  ///< number of leases of its process that ended without an answer
+    std::int64_t stalled_until_ms = 0;
+    /// The process before this one was lost with a suspect point, so other points come first.
+    bool is_spared = false;
     std::int64_t last_heard_ms;
     std::int64_t stored_ms = 0;      ///< when it last stored a point or began to hold leases
     std::size_t solved_batches = 0;  ///< number of batches solved since it joined or stalled
@@ -203,6 +197,16 @@ class Scheduler {
     std::set<LeaseId> leases;
     std::map<StudyId, std::uint64_t> defined;  ///< size of each study whose recipe the worker has
     std::map<StudyId, Pace> paces;
+  };
+  /// The leases that a lost worker process held when it was lost.
+  struct LostProcess {
+    struct Points {
+      StudyId study;
+      IntervalSet points;
+      bool alone;  ///< true if the process held only this point
+    };
+    std::uint64_t losses = 0;  ///< number of its leases that ended without an answer
+    std::vector<Points> held{};
   };
   using Effects = std::vector<Effect>;
 
@@ -232,8 +236,8 @@ class Scheduler {
 
   enum class WorkerEnd { kLeft, kReplaced, kLost };
   void withdraw(StudyId id);
-  /// Ends a lease. `loss` names the lost process; without it the points do not count as lost.
-  void end_lease(LeaseId lease, const std::optional<Loss>& loss);
+  void end_lease(LeaseId lease, bool is_lost = false);
+  void release_leases(const Study& study, const IntervalSet& places);
   /// Returns the places of the lease's points that have no answer yet.
   std::vector<Interval> open_places(const Lease& lease) const;
   bool has_open_points(const Lease& lease) const { return !open_places(lease).empty(); }
@@ -254,30 +258,25 @@ class Scheduler {
   void requeue(StudyId id);
 
   WorkerState state_of(const Worker& worker, std::int64_t now_ms) const;
-  void note_process(StudyId study, ProcessNumber process);
-  void note_loss(const Lease& lease, const std::vector<Interval>& held, Loss loss);
+  void end_connection(const std::string& process, WorkerEnd how, const std::string& reason);
   void note_end(const Worker& worker, WorkerEnd how);
-  void note_answers(Worker& worker, const ResultsReceived& event, bool any_accepted);
-  void take_back_losses(ProcessNumber process);
-  void fail_due_points();
-  bool is_proven(const Worker& worker) const;
-  bool is_set_aside(const Worker& worker) const;
-  bool is_longest_proven(const Worker& worker) const;
-  bool probe(WorkerId id, Worker& worker);
+  LostProcess take_lost(const std::string& process);
+  void forgive(const LostProcess& returned);
+  void blame(const LostProcess& lost, const EndedProcess& ended);
+  LeaseHistory* history_of(Study& study, std::uint64_t point);
+  void fail_point(StudyId study, std::uint64_t point, std::uint32_t attempts, std::string reason);
+  void stall(Worker& worker, std::int64_t duration_ms);
+  bool is_stalled(const Worker& worker) const { return now_ms_ < worker.stalled_until_ms; }
   void check_leases() const;
-  void check_losses() const;
+  void check_workers() const;
 
   void dispatch();
   bool serve(WorkerId id, Worker& worker);
-  void serve_suspect(WorkerId id, Worker& worker, StudyId study);
-  std::optional<Suspicion> suspect_for(const StudyPoints& points, const Worker& worker) const;
   bool may_hold_more(const Worker& worker) const;
   void duplicate_stragglers();
   bool is_straggling(const Lease& lease, FastestPaces& paces) const;
   bool is_current(const Study& study) const;
-  StudyId next_suspect_study(const Worker& worker) const;
-  void stop_draining(WorkerId worker);
-  BatchSize batch_size_for(const Worker& worker, StudyId study, bool fills_lanes) const;
+  BatchSize batch_size_for(const Worker& worker, StudyId study) const;
   void fill_lanes(BatchSize& wanted, const StudyPoints& points, std::uint32_t threads,
                   const Pace& pace) const;
   void use_credit(WorkerId id, Worker& worker);
@@ -285,18 +284,14 @@ class Scheduler {
 
   SchedulerSettings settings_;
   std::string solver_version_;
-  WorkerProcesses processes_{settings_.most_absent_processes};
-  // times at which new processes that held points were lost
-  std::deque<std::int64_t> vanished_ms_;
   std::map<StudyId, Study> studies_;
   std::set<Rank> free_;         // studies with free points to lease, in the order of service
   std::set<StudyId> suspects_;  // studies with suspect points to lease
-  std::set<StudyId> failing_;   // studies with failing points
   std::map<WorkerId, Worker> workers_;
+  std::map<std::string, WorkerId> connections_;  // workers by the ID of their process
+  std::map<std::string, LostProcess> lost_;      // processes that may return or be replaced
   std::map<LeaseId, Lease> leases_;
   ReadyQueue ready_workers_;  // workers with credit
-  // worker that will get suspect points when its leases have ended; 0 if there is none
-  WorkerId draining_ = 0;
   std::uint64_t examined_workers_ = 0;
   std::uint64_t threads_ = 0;
   LeaseId next_lease_ = settings_.first_lease_id;

@@ -20,7 +20,7 @@ void Scheduler::dispatch() {
   }
 }
 
-/// Uses one credit of the worker for a batch or probe, and moves it to the end of the queue.
+/// Uses one credit of the worker for a batch, and moves the worker to the end of the queue.
 void Scheduler::use_credit(WorkerId id, Worker& worker) {
   worker.credit -= std::min(worker.credit, 1U);
   ready_workers_.remove(id);
@@ -29,10 +29,10 @@ void Scheduler::use_credit(WorkerId id, Worker& worker) {
   }
 }
 
-/// Returns whether the worker reads messages, solves batches, and holds no suspect point or probe.
+/// Returns whether the worker reads messages, solves batches, and holds no suspect point.
 bool Scheduler::may_hold_more(const Worker& worker) const {
   const bool holds_suspect = !worker.leases.empty() && leases_.at(*worker.leases.begin()).alone;
-  return !worker.is_busy && !holds_suspect && worker.probe == 0 &&
+  return !worker.is_busy && !holds_suspect && !is_stalled(worker) &&
          worker.leases.size() < settings_.newcomer_batches + worker.solved_batches;
 }
 
@@ -40,45 +40,24 @@ bool Scheduler::serve(WorkerId id, Worker& worker) {
   if (!may_hold_more(worker)) {
     return false;
   }
-  if (is_set_aside(worker)) {
-    return probe(id, worker);
-  }
-  const StudyId suspect_study = next_suspect_study(worker);
-  if (suspect_study == 0) {
-    stop_draining(id);
-  } else if (!is_proven(worker)) {
-    // A new worker must prove itself with a probe before it gets suspect points.
-    if (worker.leases.empty() && free_.empty()) {
-      return probe(id, worker);
+  if (!suspects_.empty() && (free_.empty() || !worker.is_spared)) {
+    // A suspect point waits for a worker that holds nothing, so no worker gets a further batch.
+    if (!worker.leases.empty()) {
+      return false;
     }
-  } else if (worker.leases.empty()) {
-    serve_suspect(id, worker, suspect_study);
+    const StudyId study = *suspects_.begin();
+    grant(id, worker, study, studies_.at(study).points.take_suspect(), true);
     return true;
-  } else if (draining_ == id || draining_ == 0) {
-    // Suspect points need a worker without leases. Only this worker waits until it has none; other
-    // workers continue.
-    draining_ = id;
-    return false;
-  }
-  if (free_.empty()) {
-    return false;
   }
   const StudyId study = std::get<StudyId>(*free_.begin());
-  const BatchSize wanted = batch_size_for(worker, study, true);
+  const BatchSize wanted = batch_size_for(worker, study);
   grant(id, worker, study, *studies_.at(study).points.take(wanted), false);
+  worker.is_spared = false;
   // Stores the wanted size. A batch that is smaller because the run of points ends early says
   // nothing about the worker's capacity.
   auto& fit_for = worker.paces.at(study).last_batch_points;
   fit_for = std::max(fit_for, wanted.points);
   return true;
-}
-
-void Scheduler::serve_suspect(WorkerId id, Worker& worker, StudyId study) {
-  StudyPoints& points = studies_.at(study).points;
-  stop_draining(id);
-  // The batch need not fill all SIMD lanes, because a quick answer matters more.
-  const BatchSize wanted = batch_size_for(worker, study, false);
-  grant(id, worker, study, *points.take(*suspect_for(points, worker), wanted), true);
 }
 
 /// If no other points can be leased, leases the rest of slow batches to idle workers too. The first
@@ -92,17 +71,12 @@ void Scheduler::duplicate_stragglers() {
     return;
   }
   std::vector<WorkerId> helpers;
-  std::vector<WorkerId> set_aside;
   for (const auto* workers : {&ready_workers_.active(), &ready_workers_.parked()}) {
     for (const auto& [place, id] : *workers) {
       if (may_hold_more(workers_.at(id))) {
-        (is_set_aside(workers_.at(id)) ? set_aside : helpers).push_back(id);
+        helpers.push_back(id);
       }
     }
-  }
-  // workers that are set aside may help after they have solved a probe
-  for (const WorkerId id : set_aside) {
-    probe(id, workers_.at(id));
   }
   FastestPaces paces;
   // Lease numbers ascend, so the oldest lease comes first.
@@ -114,8 +88,9 @@ void Scheduler::duplicate_stragglers() {
       continue;
     }
     const std::vector<Interval> left = open_places(lease);
-    const Batch rest{left.front().begin, left.back().end - left.front().begin,
-                     lease.batch.attempts + 1, lease.batch.losses, size_of(left)};
+    Batch rest{left.front().begin, left.back().end - left.front().begin, lease.batch.history,
+               size_of(left)};
+    ++rest.history.attempts;
     lease.twin = grant(*helper, workers_.at(*helper), lease.study, rest, false);
     leases_.at(lease.twin).twin = entry->first;
     helpers.erase(helper);
@@ -123,7 +98,7 @@ void Scheduler::duplicate_stragglers() {
 }
 
 bool Scheduler::is_straggling(const Lease& lease, FastestPaces& paces) const {
-  if (lease.twin != 0 || lease.alone || !lease.batch.losses.empty() ||
+  if (lease.twin != 0 || lease.alone || lease.batch.history.losses > 0 ||
       !is_open(studies_.at(lease.study)) || !has_open_points(lease)) {
     return false;
   }
@@ -136,35 +111,7 @@ bool Scheduler::is_straggling(const Lease& lease, FastestPaces& paces) const {
   return static_cast<double>(now_ms_ - lease.granted_ms) > settings_.straggler_factor * expected_ms;
 }
 
-StudyId Scheduler::next_suspect_study(const Worker& worker) const {
-  const auto found = std::find_if(suspects_.begin(), suspects_.end(), [&](StudyId study) {
-    return suspect_for(studies_.at(study).points, worker).has_value();
-  });
-  return found == suspects_.end() ? 0 : *found;
-}
-
-/// Returns the suspicion level of the points that the worker may get, or nothing. A risky point
-/// first goes to the worker that has been proven longest, because that worker is least likely to be
-/// lost for other reasons. The caller sends an unproven worker a probe instead.
-std::optional<Suspicion> Scheduler::suspect_for(const StudyPoints& points,
-                                                const Worker& worker) const {
-  if (points.has(Suspicion::kRisky) &&
-      (!is_proven(worker) ||
-       now_ms_ - points.returned_ms(Suspicion::kRisky) >= settings_.longest_proven_within_ms ||
-       is_longest_proven(worker))) {
-    return Suspicion::kRisky;
-  }
-  return points.has(Suspicion::kSuspect) ? std::optional(Suspicion::kSuspect) : std::nullopt;
-}
-
-void Scheduler::stop_draining(WorkerId worker) {
-  if (draining_ == worker) {
-    draining_ = 0;
-    ready_workers_.unpark_all();  // another worker may now wait for suspect points
-  }
-}
-
-BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills_lanes) const {
+BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id) const {
   const auto known = worker.paces.find(id);
   const Pace pace = known == worker.paces.end() ? Pace{} : known->second;
   std::uint64_t points = settings_.first_batch_points * worker.threads;
@@ -175,8 +122,8 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
         std::min(settings_.largest_batch_points * worker.threads,
                  settings_.growth * std::max<std::uint64_t>(pace.last_batch_points, 1)));
     points = static_cast<std::uint64_t>(std::min(by_pace, largest));
-    fewest =
-        static_cast<std::uint64_t>(by_pace * settings_.shortest_batch_s / settings_.batch_target_s);
+    fewest = static_cast<std::uint64_t>(
+        std::min(by_pace * settings_.shortest_batch_s / settings_.batch_target_s, largest));
   }
   if (studies_.at(id).points.has_filter()) {
     // All points of the next batch may pass the filter, even if most of the last batch did not.
@@ -193,10 +140,8 @@ BatchSize Scheduler::batch_size_for(const Worker& worker, StudyId id, bool fills
   if (pace.last_end != 0) {
     wanted.follows = pace.last_end;
   }
-  if (fills_lanes) {
-    wanted.falls = studies_.at(id).leases.empty() ? settings_.lanes * worker.threads : 0;
-    fill_lanes(wanted, studies_.at(id).points, worker.threads, pace);
-  }
+  wanted.falls = studies_.at(id).leases.empty() ? settings_.lanes * worker.threads : 0;
+  fill_lanes(wanted, studies_.at(id).points, worker.threads, pace);
   return wanted;
 }
 
@@ -258,7 +203,7 @@ LeaseId Scheduler::grant(WorkerId id, Worker& worker, StudyId study, const Batch
   pace.last_end = batch.end();
   pace.held_points += batch.points;
   requeue(study);
-  SendBatch send{id, study, {}, batch.attempts + 1, lease};
+  SendBatch send{id, study, {}, batch.history.attempts + 1, lease};
   for (const Interval& places : open_places(leases_.at(lease))) {
     const auto points = served.points.order().points(places);
     send.points.insert(send.points.end(), points.begin(), points.end());

@@ -2,11 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
-#include "server/scheduler/losses.h"
 #include "server/study/interval_set.h"
 #include "server/study/limits.h"
 #include "server/study/study_table.h"
@@ -14,6 +16,8 @@
 // Events that the scheduler handles, and effects that it returns.
 namespace oblique::server {
 
+using StudyId = std::uint64_t;
+using WorkerId = std::uint64_t;
 using LeaseId = std::uint64_t;
 
 struct SchedulerSettings {
@@ -38,27 +42,19 @@ struct SchedulerSettings {
   /// excluded.
   std::int64_t straggler_after_ms = 1000;
   double straggler_factor = 4.0;
-  LossLimits loss_limits{};
-  std::uint64_t suspect_parts = 8;  ///< number of parts into which suspect points are split
-  /// Failing points fail after this time, unless a process that was lost with them returns.
-  std::int64_t return_within_ms = 10'000;
-  /// For this time a risky point is reserved for the worker that has been proven longest.
-  std::int64_t longest_proven_within_ms = 10'000;
-  /// A process is set aside after this number of losses in a row, until it has solved a probe.
-  std::uint32_t set_aside_after = 3;
-  /// Every new process is set aside if this number of new processes were lost with points within
-  /// `newcomers_watched_ms`.
-  std::size_t vanished_newcomers = 3;
-  std::int64_t newcomers_watched_ms = 60'000;
-  std::int64_t probe_interval_ms = 1000;  ///< minimum time between two probes of one worker
+  /// A point fails if this number of workers in a row were lost while they held only this point,
+  /// over at least `failing_after_ms`.
+  std::uint32_t failing_after = 20;
+  std::int64_t failing_after_ms = 600'000;
   /// A worker holds at most this many batches more than it has solved since it joined or stalled.
   std::size_t newcomer_batches = 2;
   /// A worker has stalled if it stores nothing for this multiple of the expected duration of its
-  /// longest batch, within the limits below. Its batches then go to others.
+  /// longest batch, within the limits below. Its batches then go to others, and it gets none for as
+  /// long again, unless it stores something.
   double stall_factor = 10.0;
   std::int64_t shortest_stall_ms = 60'000;
   std::int64_t longest_stall_ms = 3'600'000;
-  std::size_t most_absent_processes = 4096;    ///< maximum number of absent processes kept
+  std::size_t most_lost_processes = 1024;      ///< maximum number of lost processes that are kept
   std::uint32_t max_credit = limits::kCredit;  ///< batches that a worker may request at a time
   /// Points per thread in a worker's first batch of a filtered study. The batch is small, because
   /// all of its points may pass the filter.
@@ -129,11 +125,20 @@ struct StudyGrown {
 struct StudyRemoved {
   StudyId study;
 };
-/// A worker has connected. It replaces earlier workers of its process. Its number is never reused.
+/// A worker process that a signal has ended.
+struct EndedProcess {
+  std::string process;  ///< ID of the process
+  int signal = 0;
+  /// points that its solver was solving, if the signal is a crash; else empty
+  std::set<std::pair<StudyId, std::uint64_t>> points{};
+};
+/// A worker has connected. It replaces the earlier worker of its process, and the worker of the
+/// process that ended before its own. Its number is never reused.
 struct WorkerJoined {
   WorkerId worker;
   std::uint32_t threads;
   std::string process{};  ///< ID of the worker's process; empty if unknown
+  std::optional<EndedProcess> replaced{};
 };
 struct CreditGiven {
   WorkerId worker;
@@ -236,11 +241,6 @@ struct AcknowledgeResults {
   WorkerId worker;
   std::uint64_t sequence;
 };
-/// Send the worker an easy point of kProbeStudy. Its result is not stored.
-struct SendProbe {
-  WorkerId worker;
-  LeaseId lease;
-};
 /// Make the worker drop the study.
 struct WithdrawStudy {
   WorkerId worker;
@@ -261,11 +261,7 @@ struct StudyFinished {
   StudyId study;
 };
 
-using Effect =
-    std::variant<DefineStudy, SendBatch, SendProbe, StoreResults, StoreFailure, AcknowledgeResults,
-                 WithdrawStudy, ReleaseBatch, DropWorker, StudyFinished>;
-
-/// Number of the study of probes. No real study has it.
-constexpr StudyId kProbeStudy = 0;
+using Effect = std::variant<DefineStudy, SendBatch, StoreResults, StoreFailure, AcknowledgeResults,
+                            WithdrawStudy, ReleaseBatch, DropWorker, StudyFinished>;
 
 }  // namespace oblique::server

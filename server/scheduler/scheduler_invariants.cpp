@@ -21,7 +21,7 @@ void require(bool holds, const char* what) {
 
 void Scheduler::check_invariants() const {
   check_leases();
-  check_losses();
+  check_workers();
   std::size_t with_free = 0;
   for (const auto& [id, study] : studies_) {
     study.points.check_invariants();
@@ -31,10 +31,8 @@ void Scheduler::check_invariants() const {
             "more points failed or are left out than were completed");
     require(!study.cancelled || study.points.leased() == 0, "a cancelled study holds leases");
     require(study.rank == rank_of(id, study) && (!study.rank || free_.contains(*study.rank)) &&
-                suspects_.contains(id) == (is_open(study) && study.has_suspect()),
+                suspects_.contains(id) == (is_open(study) && study.points.has_suspect()),
             "the place of a study in the queue is wrong");
-    require(failing_.contains(id) || !study.points.has(Suspicion::kFailing),
-            "a study with failing points is missing from `failing_`");
     with_free += study.rank ? 1U : 0U;
   }
   require(with_free == free_.size(), "the queue contains a removed study");
@@ -54,7 +52,6 @@ void Scheduler::check_invariants() const {
     leases += worker.leases.size();
   }
   require(ready_workers_.size() <= workers_.size(), "the queue contains a removed worker");
-  require(draining_ == 0 || workers_.contains(draining_), "a removed worker drains");
   require(threads == threads_, "the number of threads is wrong");
   require(leases == leases_.size(), "a worker holds a lease that does not exist");
 }
@@ -67,8 +64,8 @@ void Scheduler::check_leases() const {
     require(worker != workers_.end() && worker->second.leases.contains(id),
             "a lease has no worker");
     require(studies_.contains(lease.study), "a lease has no study");
-    require(!lease.alone || (worker->second.leases.size() == 1 && is_proven(worker->second)),
-            "a lease of suspect points is not alone at a proven worker");
+    require(!lease.alone || (worker->second.leases.size() == 1 && lease.batch.count == 1),
+            "a suspect point is not the only one that its worker holds");
     require(lease.batch.points > 0 && lease.batch.points <= lease.batch.count && id < next_lease_,
             "a lease is malformed");
     // Completed points in a batch are ignored, because another lease may have answered them.
@@ -90,37 +87,15 @@ void Scheduler::check_leases() const {
   }
 }
 
-void Scheduler::check_losses() const {
-  processes_.check_invariants(workers_.size());
+void Scheduler::check_workers() const {
   for (const auto& [id, worker] : workers_) {
-    const WorkerProcess& process = processes_.at(worker.process);
-    require(process.workers.contains(id), "a worker is missing from its process");
-    require(worker.probe == 0 || worker.leases.empty(), "a probed worker has other leases");
+    require(worker.process.empty() || connections_.at(worker.process) == id,
+            "a process has two connections");
     require(worker.leases.size() <= settings_.newcomer_batches + worker.solved_batches,
             "a worker holds more batches than its solved ones allow");
-    require(worker.solved_batches == 0 || process.proven_since_ms,
-            "a worker has solved batches but is not proven");
   }
-  require(vanished_ms_.size() <= settings_.vanished_newcomers,
-          "too many losses of new processes are recorded");
-}
-
-void WorkerProcesses::check_invariants(std::size_t workers) const {
-  std::size_t absent = 0;
-  std::size_t connected = 0;
-  for (const auto& [number, process] : processes_) {
-    const auto by_id = numbers_.find(process.id);
-    require(process.id.empty() ? !process.workers.empty()
-                               : by_id != numbers_.end() && by_id->second == number,
-            "a worker process is missing from the index");
-    connected += process.workers.size();
-    absent += process.workers.empty() ? 1U : 0U;
-    require(!process.workers.empty() || std::ranges::count(absent_, number) == 1,
-            "an absent process is not listed exactly once");
-  }
-  require(connected == workers, "a process has unknown workers");
-  require(absent == absent_.size() && absent <= most_absent_,
-          "the list of absent processes is wrong");
+  require(connections_.size() <= workers_.size(), "a removed worker is connected");
+  require(lost_.size() <= settings_.most_lost_processes, "too many lost processes are kept");
 }
 
 }  // namespace oblique::server

@@ -24,9 +24,8 @@ std::uint64_t border_near(const Interval& cut, std::uint64_t first, std::uint64_
 
 }  // namespace
 
-StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
-                         const LossLimits& limits)
-    : table_(std::move(table)), limits_(limits), completed_(std::move(completed)) {
+StudyPoints::StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out)
+    : table_(std::move(table)), completed_(std::move(completed)) {
   completed_.erase(size(), std::numeric_limits<std::uint64_t>::max());
   // A database that another program has edited may count more left-out than completed points.
   left_out_ = std::min(left_out, completed_.size());
@@ -51,10 +50,9 @@ void StudyPoints::arrange(std::uint64_t falls_a_group) {
   }
   for (Returned& intervals : returned_) {
     for (const auto& [first, returned] : std::exchange(intervals, {})) {
-      const History& history = returned;  // Clang cannot capture a structured binding in a lambda
-      order_.places(IntervalSet(first, history.end)).for_each([&](const Interval& interval) {
-        History& part = intervals.emplace(interval.begin, history).first->second;
-        part.end = interval.end;
+      const LeaseHistory& history = returned.history;  // Clang cannot capture structured bindings
+      order_.places(IntervalSet(first, returned.end)).for_each([&](const Interval& interval) {
+        intervals.emplace(interval.begin, ReturnedRange{interval.end, history});
       });
     }
   }
@@ -69,32 +67,37 @@ void StudyPoints::rest(bool has_leases) {
   }
 }
 
-void StudyPoints::give_back(std::span<const Interval> parts, std::uint32_t attempts,
-                            const LossHistory& losses, std::int64_t now_ms) {
-  Returned& intervals = returned(losses.suspicion(limits_));
+void StudyPoints::give_back(std::span<const Interval> parts, const LeaseHistory& history) {
   for (const Interval& part : parts) {
     for (const Interval& interval : leased_.within(part.begin, part.end)) {
-      intervals.emplace(interval.begin, History{interval.end, attempts, losses, now_ms});
+      returned(history.is_suspect()).emplace(interval.begin, ReturnedRange{interval.end, history});
       returned_points_ += interval.end - interval.begin;
     }
     leased_.erase(part.begin, part.end);
   }
 }
 
-void StudyPoints::take_back_losses(ProcessNumber process) {
-  Returned cleared;
+LeaseHistory* StudyPoints::suspect(std::uint64_t point) {
+  const LeaseHistory* const known = returned_history(point);
+  LeaseHistory history = known == nullptr ? LeaseHistory() : *known;
+  history.has_crashed = true;
+  const std::uint64_t place = order_.place(point);
+  if (extract(IntervalSet(place, place + 1)).empty()) {
+    return nullptr;
+  }
+  ++returned_points_;
+  return &returned(true).emplace(place, ReturnedRange{place + 1, history}).first->second.history;
+}
+
+LeaseHistory* StudyPoints::returned_history(std::uint64_t point) {
+  const std::uint64_t place = order_.place(point);
   for (Returned& intervals : returned_) {
-    for (auto interval = intervals.begin(); interval != intervals.end();) {
-      const auto next = std::next(interval);
-      if (interval->second.losses.take_back(process)) {
-        cleared.insert(intervals.extract(interval));
-      }
-      interval = next;
+    const auto next = intervals.upper_bound(place);
+    if (next != intervals.begin() && std::prev(next)->second.end > place) {
+      return &std::prev(next)->second.history;
     }
   }
-  for (auto& [first, history] : cleared) {
-    returned(history.losses.suspicion(limits_)).emplace(first, history);
-  }
+  return nullptr;
 }
 
 bool StudyPoints::receive(std::uint64_t number) {
@@ -198,19 +201,19 @@ std::vector<Interval> StudyPoints::extract_from(Returned& intervals, const Inter
   }
   while (interval != intervals.end() && interval->first < range.end) {
     const std::uint64_t first = interval->first;
-    const History history = interval->second;
-    if (history.end <= range.begin) {
+    const ReturnedRange whole = interval->second;
+    if (whole.end <= range.begin) {
       ++interval;
       continue;
     }
     interval = intervals.erase(interval);
-    parts.push_back({std::max(first, range.begin), std::min(history.end, range.end)});
+    parts.push_back({std::max(first, range.begin), std::min(whole.end, range.end)});
     returned_points_ -= parts.back().end - parts.back().begin;
     if (first < range.begin) {
-      intervals.emplace(first, history).first->second.end = range.begin;
+      intervals.emplace(first, ReturnedRange{range.begin, whole.history});
     }
-    if (range.end < history.end) {
-      intervals.emplace(range.end, history);
+    if (range.end < whole.end) {
+      intervals.emplace(range.end, whole);
     }
   }
   return parts;
@@ -252,8 +255,8 @@ std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& 
 
 std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
   arrange(wanted.falls);
-  if (has(Suspicion::kSound)) {
-    return take(Suspicion::kSound, wanted);
+  if (!returned(false).empty()) {
+    return take_returned(returned(false), wanted);
   }
   const auto free = next_fresh(wanted.follows);
   if (!free) {
@@ -270,7 +273,7 @@ std::optional<Batch> StudyPoints::take(const BatchSize& wanted) {
     run_end = next->end;
   }
   begun_until_ = std::max(begun_until_, order_.group_at(*table_.get(), end - 1).end);
-  return Batch{free->begin, end - free->begin, 0, {}, newly_leased()};
+  return Batch{free->begin, end - free->begin, {}, newly_leased()};
 }
 
 /// Returns the next fresh points if they can extend a batch that ends at `end` and has `leased` of
@@ -323,37 +326,17 @@ std::optional<Interval> StudyPoints::next_fresh(std::optional<std::uint64_t> fol
   return Interval{last.begin + (last.end - last.begin) / 2, last.end};
 }
 
-std::optional<Batch> StudyPoints::take(Suspicion suspicion, const BatchSize& wanted) {
-  Returned& intervals = returned(suspicion);
-  if (intervals.empty()) {
-    return std::nullopt;
-  }
-  const auto [first, history] = *intervals.begin();
-  const std::uint64_t end = end_of_batch(*table_.get(), order_, {first, history.end}, wanted);
+/// Leases points from the start of the first interval.
+Batch StudyPoints::take_returned(Returned& intervals, const BatchSize& wanted) {
+  const auto [first, whole] = *intervals.begin();
+  const std::uint64_t end = end_of_batch(*table_.get(), order_, {first, whole.end}, wanted);
   intervals.erase(intervals.begin());
-  if (end < history.end) {
-    intervals.emplace(end, history);
+  if (end < whole.end) {
+    intervals.emplace(end, whole);
   }
   leased_.insert(first, end);
   returned_points_ -= end - first;
-  return Batch{first, end - first, history.attempts, history.losses};
-}
-
-std::vector<StudyPoints::Failure> StudyPoints::take_due_failures(std::int64_t until_ms) {
-  std::vector<Failure> failures;
-  Returned& condemned = returned(Suspicion::kFailing);
-  for (auto entry = condemned.begin(); entry != condemned.end();) {
-    const auto& [place, history] = *entry;
-    if (history.returned_ms > until_ms) {
-      ++entry;
-      continue;
-    }
-    failures.push_back({order_.point(place), history.attempts, history.losses.alone()});
-    committing_.insert(place);
-    --returned_points_;
-    entry = condemned.erase(entry);
-  }
-  return failures;
+  return {first, end - first, whole.history};
 }
 
 void StudyPoints::check_invariants() const {
@@ -370,13 +353,12 @@ void StudyPoints::check_invariants() const {
   for (const auto* set : {&fresh_, &leased_, &committing_, &completed_}) {
     set->for_each(add);
   }
-  for (const Suspicion suspicion :
-       {Suspicion::kSound, Suspicion::kSuspect, Suspicion::kRisky, Suspicion::kFailing}) {
-    for (const auto& [first, history] : returned(suspicion)) {
-      add({first, history.end});
-      came_back += history.end - first;
-      if (history.losses.suspicion(limits_) != suspicion) {
-        throw std::logic_error("returned points are listed under another suspicion");
+  for (const bool is_suspect : {false, true}) {
+    for (const auto& [first, whole] : returned(is_suspect)) {
+      add({first, whole.end});
+      came_back += whole.end - first;
+      if (whole.history.is_suspect() != is_suspect) {
+        throw std::logic_error("returned points are in the wrong set");
       }
     }
   }

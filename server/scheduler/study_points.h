@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "server/scheduler/losses.h"
 #include "server/scheduler/point_order.h"
 #include "server/study/interval_set.h"
 #include "server/study/study_table.h"
@@ -34,13 +33,29 @@ struct BatchSize {
 std::uint64_t end_of_batch(const protocol::PointTable& table, const PointOrder& order,
                            const Interval& free, const BatchSize& wanted);
 
+/// How the earlier leases of some points ended.
+struct LeaseHistory {
+  std::uint32_t attempts = 0;  ///< number of leases that ended
+  std::uint32_t losses = 0;    ///< number of them that ended because the worker was lost
+  bool has_crashed = false;    ///< a solver crashed on these points, perhaps because of others
+  int signal = 0;  ///< signal of the first crash of a solver that held only this point; 0: none
+  /// Number of workers in a row that were lost while they held only this point.
+  std::uint32_t lost_alone = 0;
+  std::int64_t lost_alone_since_ms = 0;  ///< time of the first of these losses
+
+  /// Returns whether each of the points must be leased alone, to a worker that holds nothing else.
+  bool is_suspect() const {
+    constexpr std::uint32_t kMaxLosses = 5;
+    return has_crashed || losses >= kMaxLosses;
+  }
+};
+
 /// Points that are leased together: a run of places (PointOrder). Points in the run that were
 /// completed before are not leased.
 struct Batch {
   std::uint64_t first_place;
   std::uint64_t count;
-  std::uint32_t attempts;        ///< number of earlier leases of these points
-  LossHistory losses;            ///< losses of earlier leases
+  LeaseHistory history;
   std::uint64_t points = count;  ///< number of leased points at these places
 
   std::uint64_t end() const { return first_place + count; }
@@ -48,7 +63,7 @@ struct Batch {
 
 /// The state of each point of a study. Every point is in exactly one set:
 /// - fresh: never leased by this run of the server
-/// - returned: leased before; each level of suspicion has a set of its own
+/// - returned: leased before; suspect points have a set of their own
 /// - leased
 /// - committing: its result is being written
 /// - completed: it has a row, or a filter leaves it out
@@ -60,8 +75,7 @@ class StudyPoints {
  public:
   /// `completed` contains the completed points, among them `left_out` points that a filter leaves
   /// out. If the study is complete, its PointTable is not made.
-  StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out,
-              const LossLimits& limits);
+  StudyPoints(StudyTable table, IntervalSet completed, std::uint64_t left_out);
 
   std::uint64_t size() const { return table_.size(); }
   /// Returns whether the points have several models. Makes the PointTable if necessary.
@@ -76,24 +90,18 @@ class StudyPoints {
   /// the rest of the group at `wanted.follows`, then from groups that no worker has begun, then
   /// from the second half of the last fresh points. Returns nothing if no point is left.
   std::optional<Batch> take(const BatchSize& wanted);
-  /// Leases returned points with this level of suspicion.
-  std::optional<Batch> take(Suspicion suspicion, const BatchSize& wanted);
-  /// A point that fails, and the reason.
-  struct Failure {
-    std::uint64_t point;
-    std::uint32_t attempts;
-    std::uint32_t alone;  ///< number of workers that were lost while they held only this point
-  };
-  /// Moves points that have been kFailing since `until_ms` or earlier to committing. Returns them.
-  std::vector<Failure> take_due_failures(std::int64_t until_ms);
+  /// Leases one suspect point. There must be one.
+  Batch take_suspect() { return take_returned(returned(true), {1}); }
 
-  /// Moves the leased points at the places `parts` to the returned points, with the given history
-  /// and the time `now_ms`. `parts` are in order. Points between the parts do not change.
-  void give_back(std::span<const Interval> parts, std::uint32_t attempts, const LossHistory& losses,
-                 std::int64_t now_ms);
+  /// Moves the leased points at the places `parts` to the returned points, with the given history.
+  /// `parts` are in order. Points between the parts do not change.
+  void give_back(std::span<const Interval> parts, const LeaseHistory& history);
 
-  /// Removes the losses of this process from the histories of all returned points.
-  void take_back_losses(ProcessNumber process);
+  /// Makes an open point suspect, because a solver crashed on it. The point must not be leased.
+  /// Returns its history; null for a point that is not open.
+  LeaseHistory* suspect(std::uint64_t point);
+  /// Returns the history that includes this point; null unless the point is returned.
+  LeaseHistory* returned_history(std::uint64_t point);
 
   /// Moves a point to committing, because its result was received. Returns false if a result was
   /// received before or the point is not in the study.
@@ -118,17 +126,11 @@ class StudyPoints {
   /// Moves these points from completed to fresh. Returns the number of moved points.
   std::uint64_t reopen(const IntervalSet& points);
 
-  bool has_free() const { return has(Suspicion::kSound) || !fresh_.empty(); }
+  bool has_free() const { return !returned(false).empty() || !fresh_.empty(); }
+  bool has_suspect() const { return !returned(true).empty(); }
   bool has_filter() const { return table_->has_filter(); }
   /// Returns whether all of these points are in blocks with a filter.
   bool may_leave_out(const IntervalSet& points) const;
-  /// Returns whether any returned points have this level of suspicion.
-  bool has(Suspicion suspicion) const { return !returned(suspicion).empty(); }
-  /// Of the returned points of this level, takes the one at the lowest place and returns when it
-  /// was returned. There must be such a point.
-  std::int64_t returned_ms(Suspicion suspicion) const {
-    return returned(suspicion).begin()->second.returned_ms;
-  }
   bool is_complete() const { return completed() >= size(); }
   /// Returns whether any point has a result, durable or being written. Left-out points have none.
   bool has_results() const {
@@ -147,20 +149,15 @@ class StudyPoints {
   void check_invariants() const;
 
  private:
-  struct History {
+  struct ReturnedRange {
     std::uint64_t end;
-    std::uint32_t attempts;
-    LossHistory losses;
-    std::int64_t returned_ms;
+    LeaseHistory history;
   };
-  using Returned = std::map<std::uint64_t, History>;  // by first place
+  using Returned = std::map<std::uint64_t, ReturnedRange>;  // by first place
 
-  Returned& returned(Suspicion suspicion) {
-    return returned_.at(static_cast<std::size_t>(suspicion));
-  }
-  const Returned& returned(Suspicion suspicion) const {
-    return returned_.at(static_cast<std::size_t>(suspicion));
-  }
+  Returned& returned(bool is_suspect) { return returned_.at(is_suspect ? 1 : 0); }
+  const Returned& returned(bool is_suspect) const { return returned_.at(is_suspect ? 1 : 0); }
+  Batch take_returned(Returned& intervals, const BatchSize& wanted);
   void arrange(std::uint64_t falls_a_group);
   std::optional<Interval> next_fresh(std::optional<std::uint64_t> follows) const;
   std::uint64_t lease_fresh(const Interval& free, const BatchSize& wanted);
@@ -171,18 +168,17 @@ class StudyPoints {
 
   StudyTable table_;
   PointOrder order_;
-  LossLimits limits_;
   IntervalSet fresh_;
   std::uint64_t begun_until_ = 0;  // end of the last group with points that were leased
   bool was_arranged_ = false;      // true if `arrange` was called, even if it changed nothing
   std::uint64_t falls_a_group_ = 1;
-  std::array<Returned, 4> returned_;  // by suspicion
+  std::array<Returned, 2> returned_;  // the points that are not suspect, and those that are
   IntervalSet leased_;
   IntervalSet committing_;
   IntervalSet completed_;
   std::uint64_t left_out_;  // number of completed points that a filter leaves out
   std::uint64_t committing_left_out_ = 0;
-  std::uint64_t returned_points_ = 0;  // number of returned points of all levels
+  std::uint64_t returned_points_ = 0;  // number of returned points, suspect or not
 };
 
 }  // namespace oblique::server

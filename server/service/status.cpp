@@ -32,7 +32,7 @@ std::string reason_to_wait(const Core& core, const StudyCounts& counts, const Re
     return fmt::format("a server with solver version {}, which solved its results",
                        counts.solver_version);
   }
-  if (counts.leased == 0 && core.scheduler.sets_all_aside()) {
+  if (counts.leased == 0 && core.scheduler.are_all_stalled()) {
     return "a worker";
   }
   return {};
@@ -100,8 +100,6 @@ protocol::WorkerStatus worker_status(WorkerId id, const Core& core, Instant now)
   status.set_solved_points(counts.solved_points);
   status.set_silent_ms(static_cast<std::uint32_t>(counts.silent_ms));
   status.set_losses(counts.losses);
-  status.set_set_aside(counts.is_set_aside);
-  status.set_proven(counts.is_proven);
   status.set_key(worker.key);
   status.set_host(worker.host);
   status.set_points_per_s(core.worker_rates.points_per_s(id, now.steady_ms));

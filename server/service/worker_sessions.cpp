@@ -8,7 +8,6 @@
 
 #include "proto/frames.h"
 #include "proto/recipe/blocks.h"
-#include "proto/recipe/model_message.h"
 #include "proto/result_message.h"
 #include "proto/text.h"
 #include "proto/wire/frame_scan.h"
@@ -46,17 +45,20 @@ std::optional<IntervalSet> left_out_of(const protocol::Results& message) {
   return points;
 }
 
-/// Returns a recipe with one point that is solved quickly.
-protocol::Recipe probe_recipe() {
-  protocol::Recipe recipe;
-  *recipe.mutable_model() = protocol::to_message(solver::preset("paper"));
-  protocol::Block& block = *recipe.add_blocks();
-  for (const auto& [key, value] : {std::pair{"H", 1.0}, {"mu", 0.4}, {"e", 1.0}}) {
-    protocol::Axis& axis = *block.add_axes();
-    axis.set_key(key);
-    axis.add_values(value);
+/// Returns the process before the worker's; nothing if there was none. Ignores points above a
+/// limit.
+std::optional<EndedProcess> ended_process(const protocol::WorkerHello& hello) {
+  constexpr int kMaxNumbers = 100'000;
+  if (!hello.has_replaced()) {
+    return std::nullopt;
   }
-  return recipe;
+  const protocol::EndedProcess& message = hello.replaced();
+  EndedProcess ended{protocol::shortened(message.process_id(), kLongestWorkerText),
+                     message.signal()};
+  for (int i = 0; i + 1 < std::min(message.points_size(), kMaxNumbers); i += 2) {
+    ended.points.emplace(message.points(i), message.points(i + 1));
+  }
+  return ended;
 }
 
 }  // namespace
@@ -178,7 +180,8 @@ void WorkerSessions::hello(const std::string& identity, const protocol::WorkerHe
     send_stopping(id);
   }
   input.events.emplace_back(WorkerJoined{
-      id, worker.row.threads, protocol::shortened(hello.process_id(), kLongestWorkerText)});
+      id, worker.row.threads, protocol::shortened(hello.process_id(), kLongestWorkerText),
+      ended_process(hello)});
 }
 
 std::string WorkerSessions::refusal_reason(const protocol::WorkerHello& hello) const {
@@ -298,14 +301,6 @@ void WorkerSessions::send(const SendBatch& batch) {
     reached = range.end;
   }
   send(batch.worker, message, batch.lease);
-}
-
-void WorkerSessions::send(const SendProbe& probe) {
-  protocol::ServerToWorker definition;
-  definition.mutable_study()->set_study_id(kProbeStudy);
-  *definition.mutable_study()->mutable_recipe() = probe_recipe();
-  send(probe.worker, definition);
-  send(SendBatch{probe.worker, kProbeStudy, {{0, 1}}, 1, probe.lease});
 }
 
 void WorkerSessions::send(const AcknowledgeResults& stored) {

@@ -63,7 +63,6 @@ class WorkerSessions {
 
   // Send messages to workers. Workers that have disconnected are ignored.
   void send(const SendBatch& batch);
-  void send(const SendProbe& probe);
   void send(const AcknowledgeResults& stored);
   void send(const WithdrawStudy& withdraw);
   void send(const ReleaseBatch& release);

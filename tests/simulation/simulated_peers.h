@@ -56,8 +56,10 @@ class SimulatedWorker {
         ms_per_point_(world.chance(0.2) ? world.between(50, 400) : world.between(1, 20)),
         ms_per_fall_(world.chance(0.3) ? world.between(5, 50) : 0) {}
 
-  /// Kills the process if it runs, and starts another after `away_ms`.
+  /// Kills the process if it runs, and starts another after `away_ms`. Sometimes the other one
+  /// reports that the solver crashed.
   void restart(std::int64_t away_ms) {
+    note_crash();
     ++life_;
     ++sockets_;
     network_.close(link_, world_.chance(0.5));
@@ -88,19 +90,45 @@ class SimulatedWorker {
     return found == sent_.end() ? nullptr : &found->second;
   }
   bool holds_nothing() const { return batches_.empty(); }
+  std::uint64_t reported_crashes = 0;
 
  private:
   struct Work {
     worker::Batch batch;
     std::uint64_t solved;  ///< number of leading positions of `batch` that are solved or left out
   };
+  /// Prepares the report of a crash on several points. A point on which the solver crashed alone
+  /// would fail.
+  void note_crash() {
+    replaced_.clear_points();
+    replaced_.set_process_id(process_id());
+    replaced_.set_signal(9);
+    if (batches_.empty() || world_.chance(0.5)) {
+      return;
+    }
+    const Work& work = batches_.front();
+    for (std::uint64_t i = work.solved; i < std::min(work.solved + 3, work.batch.size()); ++i) {
+      replaced_.add_points(work.batch.study_id());
+      replaced_.add_points(work.batch.point_at(i));
+    }
+    if (replaced_.points_size() > 2) {
+      replaced_.set_signal(11);
+      ++reported_crashes;
+    } else {
+      replaced_.clear_points();
+    }
+  }
+  std::string process_id() const {
+    return std::to_string(peer_) + " in life " + std::to_string(life_);
+  }
   void start() {
     protocol::WorkerHello hello;
     protocol::set_protocol(hello);
     hello.set_solver_version("1");
     hello.set_threads(1);
     ++life_;
-    hello.set_process_id(std::to_string(peer_) + " in life " + std::to_string(life_));
+    hello.set_process_id(process_id());
+    *hello.mutable_replaced() = replaced_;
     planned_time_ms_ = -1;
     worker::ConversationSettings settings;
     if (leaves_ && world_.chance(0.2)) {
@@ -204,7 +232,8 @@ class SimulatedWorker {
                               {},
                               1e-3 * static_cast<double>(busy_ms_),
                               false,
-                              {}};
+                              {},
+                              work.batch.attempt()};
     work.batch.append_points(work.solved, position, progress.left_out);
     if (position < work.batch.size()) {
       const std::uint64_t point = work.batch.point_at(position);
@@ -254,6 +283,7 @@ class SimulatedWorker {
   bool solving_ = false;
   std::int64_t frozen_until_ms_ = 0;
   std::int64_t planned_time_ms_ = -1;
+  protocol::EndedProcess replaced_;
   std::uint64_t life_ = 0;     // number of processes; events of earlier processes are ignored
   std::uint64_t sockets_ = 0;  // number of sockets; messages of earlier sockets are ignored
   std::map<std::pair<Network::LinkId, std::uint64_t>, protocol::Results> sent_;

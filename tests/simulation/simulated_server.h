@@ -25,8 +25,7 @@ class SimulatedServer final : public server::Ports {
   /// Called with the contents that a starting server has read from the store.
   using OnStarted = std::function<void(const Found& found)>;
 
-  SimulatedServer(World& world, SimulatedDisk& disk, std::uint32_t max_losses)
-      : world_(world), disk_(disk), max_losses_(max_losses) {}
+  SimulatedServer(World& world, SimulatedDisk& disk) : world_(world), disk_(disk) {}
 
   /// Starts the server, and tries again while the disk fails.
   void start() {
@@ -44,7 +43,6 @@ class SimulatedServer final : public server::Ports {
     }
     on_started(found);
     server::ServiceSettings settings;
-    settings.scheduler.loss_limits.failing_after = max_losses_;
     // server/event_loop/event_loop.cpp computes the first lease number in the same way.
     settings.scheduler.first_lease_id = found.starts << 40U;
     settings.solver_version = "1";
@@ -243,7 +241,6 @@ class SimulatedServer final : public server::Ports {
 
   World& world_;
   SimulatedDisk& disk_;
-  std::uint32_t max_losses_;
   std::optional<server::Service> service_;
   std::optional<server::GroupCommit> commits_;
   std::deque<server::WriteJob> jobs_;

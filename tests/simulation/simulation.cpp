@@ -24,9 +24,7 @@ class Simulation {
       : settings_(settings),
         world_(seed),
         disk_(world_),
-        // Number of lost workers after which a point fails. It is high except in storms, because
-        // random crashes also hit workers with sound points.
-        server_(world_, disk_, settings.storms ? 3 : 1000),
+        server_(world_, disk_),
         workers_network_(world_, [this](const std::string& i,
                                         const std::string& f) { server_.worker_frame(i, f); }),
         clients_network_(world_, [this](const std::string& i, const std::string& f) {
@@ -56,6 +54,9 @@ class Simulation {
       outcome_["growths"] += client->growths;
       outcome_["renamings"] += client->renamings;
       outcome_["deletions"] += client->deletions;
+    }
+    for (const auto& worker : workers_) {
+      outcome_["reported crashes"] += worker->reported_crashes;
     }
     outcome_["cleared rows"] = disk_.cleared_rows;
     outcome_["vanished peers"] = vanished_with_points_;
@@ -134,8 +135,7 @@ class Simulation {
     const auto link =
         workers_network_.open(kFirstPeer + vanishing_peers_, [has_points](const auto& frame) {
           protocol::ServerToWorker message;
-          *has_points = *has_points || (protocol::decode(frame, message) && message.has_batch() &&
-                                        message.batch().study_id() != 0);
+          *has_points = *has_points || (protocol::decode(frame, message) && message.has_batch());
         });
     protocol::WorkerMessage hello;
     protocol::set_protocol(*hello.mutable_hello());
@@ -252,8 +252,7 @@ class Simulation {
     for (const auto& worker : workers_) {
       const auto* results = worker->sent(link, sequence);
       // The server acknowledges results of a deleted study but does not store them.
-      if (results == nullptr || results->study_id() == server::kProbeStudy ||
-          disk_.model().study(results->study_id()) == nullptr) {
+      if (results == nullptr || disk_.model().study(results->study_id()) == nullptr) {
         continue;
       }
       for (const auto& result : results->results()) {

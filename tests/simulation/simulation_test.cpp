@@ -49,6 +49,7 @@ TEST_P(SimulationTest, EveryPointEndsWithOneRightRowDespiteFaults) {
                                             {"failed commits", count},
                                             {"failed syncs", count / 4},
                                             {"worker faults", count},
+                                            {"reported crashes", 0},
                                             {"partitions", count / 4},
                                             {"clock jumps", count / 4},
                                             {"growths", count / 4},
@@ -69,6 +70,7 @@ TEST(StormsTest, NoPointFailsBecauseOfLostWorkersIfOneWorkerIsSound) {
   EXPECT_GT(all["worker faults"], 5 * count);
   EXPECT_GT(all["cuts"], 5 * count / 2);
   EXPECT_GT(all["vanished peers"], count / 2);
+  EXPECT_GT(all["reported crashes"], count / 2);
 }
 
 TEST(SeedTest, TheSameSeedRepeatsARunExactly) {

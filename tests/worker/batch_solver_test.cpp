@@ -1,11 +1,14 @@
 #include "worker/batch_solver.h"
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -296,6 +299,33 @@ TEST_F(BatchSolverTest, AFreeThreadSkipsADroppedBatchThatAnotherThreadStillSolve
   shared.add(batch(2, 0, 1));
   next_is_solved.wait(false);
   dropped_batch.open(1000);
+}
+
+TEST(BatchSolver, RecordsThePointsThatItSolvesAndTheAttemptOfTheirBatch) {
+  std::array<SolvingSlot, 2> slots{};
+  const auto recorded = [&](std::uint64_t point) {
+    const auto& points = slots[1].points;
+    return std::count(std::begin(points), std::end(points), point + 1) == 1;
+  };
+  std::vector<bool> seen;
+  std::promise<void> ended;
+  BatchSolver solver(
+      [&](const Batch&, solver::PointSource& points, const solver::TakeOutcome& take) {
+        const auto first = points.next();
+        const auto second = points.next();
+        seen = {slots[1].study_id == 7, recorded(40), recorded(41), !recorded(42)};
+        take({*first, std::nullopt, "for the test"});
+        seen.insert(seen.end(), {!recorded(40), recorded(41)});
+        take({*second, std::nullopt, "for the test"});
+        fail_all(points, take);
+      },
+      [&] { ended.set_value(); }, 1, slots);
+  solver.add({1, 7, {{40, 43}}, server::table_of(100), 3});
+  ended.get_future().wait();
+  EXPECT_EQ(seen, std::vector<bool>(6, true));
+  EXPECT_EQ(slots[1].solved, 3U);
+  EXPECT_TRUE(std::ranges::all_of(slots[1].points, [](std::uint64_t point) { return point == 0; }));
+  EXPECT_EQ(solver.collect().at(0).attempt, 3U);
 }
 
 TEST(BatchSolver, EveryPointOfManyBatchesIsSolvedOnceByAnyNumberOfThreads) {

@@ -40,6 +40,21 @@ TEST_F(ConversationTest, ResultsMessagesAreNumberedFromOneAndTheLastOneEndsTheBa
   EXPECT_EQ(results.results(5).point(), 9U);
 }
 
+TEST_F(ConversationTest, ResultsOfABatchOfAnEarlierSessionKeepItsAttempt) {
+  join();
+  protocol::ServerToWorker batch = batch_message(7, 31);
+  batch.mutable_batch()->set_attempt(5);
+  receive(batch);
+  EXPECT_EQ(effects_of<Solve>().at(0).batch.attempt(), 5U);
+  rejoin();
+  std::vector<Progress> progress(1);
+  progress[0] = {
+      .batch = 1, .study_id = 7, .results = {protocol::failed_point(3, "x")}, .attempt = 5};
+  take(conversation_->on_progress(std::move(progress), now_ms_));
+  EXPECT_EQ(sent_results().at(0).attempt(), 5U);
+  EXPECT_EQ(sent_results().at(0).lease_id(), 0U);
+}
+
 TEST_F(ConversationTest, TheEndOfABatchIsReportedEvenWithoutNewResults) {
   join_with_batch();
   solve(1, 0, 10, false);

@@ -330,7 +330,7 @@ TEST(SchedulerFalls, PointsOfALostWorkerAreLeasedAgainAndAFailedPointKeepsItsNum
 // ---- Open points between completed points, as in a fine grid that has reused a coarse grid ----
 
 StudyPoints points_without(std::uint64_t numbers, IntervalSet completed) {
-  return {StudyTable(table_of(numbers)), std::move(completed), 0, LossLimits{}};
+  return {StudyTable(table_of(numbers)), std::move(completed), 0};
 }
 
 Batch take(StudyPoints& points, const BatchSize& wanted) {
@@ -375,10 +375,10 @@ TEST(ScatteredPointsTest, ABatchContinuesWithAnotherModelOnlyIfAllItsPointsFit) 
   const auto table = std::make_shared<const protocol::PointTable>(
       protocol::recipe_of({{protocol::listed("E", {6e10, 7e10}), protocol::listed("H", {1.0}),
                             protocol::range("mu", 0.0, 1.0, 10), protocol::listed("e", {1.0})}}));
-  StudyPoints points(StudyTable(table), every(2, 20), 0, LossLimits{});
+  StudyPoints points(StudyTable(table), every(2, 20), 0);
   EXPECT_EQ(take(points, {8}).end(), 10U)
       << "the fall of the second model belongs to another worker";
-  StudyPoints both(StudyTable(table), every(2, 20), 0, LossLimits{});
+  StudyPoints both(StudyTable(table), every(2, 20), 0);
   EXPECT_EQ(take(both, {18}).end(), 20U);
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -55,18 +56,10 @@ class SchedulerBench {
   }
 
   /// Like `join`, but for a worker of the given process. Returns all effects.
-  std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit) {
-    auto effects = feed(WorkerJoined{worker, 1, process});
+  std::vector<Effect> join_as(const std::string& process, WorkerId worker, std::uint32_t credit,
+                              const std::optional<EndedProcess>& replaced = {}) {
+    auto effects = feed(WorkerJoined{worker, 1, process, replaced});
     append(effects, feed(CreditGiven{worker, credit}));
-    return effects;
-  }
-
-  /// Makes the worker solve the probe and request another batch. Returns all effects.
-  std::vector<Effect> solve_probe(const SendProbe& probe) {
-    auto effects = feed(ResultsReceived{
-        probe.worker, kProbeStudy, probe.lease, ++sequence, true, 1e-3, {{0, false}}});
-    append(effects, feed(ResultsStored{probe.worker, kProbeStudy, sequence, {}}));
-    append(effects, feed(CreditGiven{probe.worker, 1}));
     return effects;
   }
 

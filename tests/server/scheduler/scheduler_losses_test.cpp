@@ -18,14 +18,6 @@
 namespace oblique::server {
 namespace {
 
-/// Makes the new workers 1, 2 and 3 join, get a batch, and disappear without solving a point.
-void lose_newcomers(SchedulerBench& bench) {
-  for (const WorkerId newcomer : {1U, 2U, 3U}) {
-    bench.join(newcomer, 1);
-    bench.feed(WorkerUnreachable{newcomer});
-  }
-}
-
 TEST(SchedulerLosses, PeersThatTakeBatchesAndDisappearUnderNewNamesFailNoPoint) {
   SchedulerBench bench(table_of(2000));
   WorkerId fake = 100;
@@ -44,13 +36,11 @@ TEST(SchedulerLosses, PeersThatTakeBatchesAndDisappearUnderNewNamesFailNoPoint) 
   for (int i = 0; i < 10'000 && !finished; ++i) {
     failures += vanish() + only<StoreFailure>(effects).size();
     std::vector<Effect> next = bench.pass(250, {1});
-    for (const auto& probe : only<SendProbe>(effects)) {
-      SchedulerBench::append(next,
-                             probe.worker == 1 ? bench.solve_probe(probe) : std::vector<Effect>{});
-    }
     for (const auto& batch : only<SendBatch>(effects)) {
-      SchedulerBench::append(next, bench.solve_and_store(batch));
-      SchedulerBench::append(next, bench.feed(CreditGiven{1, 1}));
+      if (batch.worker == 1) {
+        SchedulerBench::append(next, bench.solve_and_store(batch));
+        SchedulerBench::append(next, bench.feed(CreditGiven{1, 1}));
+      }
     }
     finished = !only<StudyFinished>(next).empty();
     effects = std::move(next);
@@ -58,54 +48,6 @@ TEST(SchedulerLosses, PeersThatTakeBatchesAndDisappearUnderNewNamesFailNoPoint) 
   EXPECT_EQ(failures, 0U);
   EXPECT_TRUE(finished);
   EXPECT_EQ(bench.scheduler.study(1).solved(), 2000U);
-}
-
-TEST(SchedulerLosses, NewWorkersMustSolveAProbeWhileOthersAreLostWithPoints) {
-  SchedulerBench bench(table_of(1'000'000));
-  for (const WorkerId fake : {1U, 2U, 3U}) {
-    EXPECT_FALSE(bench.join(fake, 1).empty());
-    bench.feed(WorkerUnreachable{fake});
-  }
-  const auto effects = bench.join_as("sound", 4, 2);
-  EXPECT_TRUE(only<SendBatch>(effects).empty());
-  ASSERT_EQ(only<SendProbe>(effects).size(), 1U) << "expected one probe";
-  EXPECT_TRUE(bench.scheduler.worker(4, bench.now_ms).is_set_aside);
-  EXPECT_FALSE(bench.scheduler.worker(4, bench.now_ms).is_proven);
-  EXPECT_FALSE(only<SendBatch>(bench.solve_probe(only<SendProbe>(effects)[0])).empty());
-  EXPECT_FALSE(bench.scheduler.worker(4, bench.now_ms).is_set_aside);
-  EXPECT_TRUE(bench.scheduler.worker(4, bench.now_ms).is_proven);
-  bench.pass(61'000, {4});
-  EXPECT_FALSE(bench.join(5, 1).empty())
-      << "after a minute without losses a new worker gets batches";
-}
-
-TEST(SchedulerLosses, AnUnsolvedProbeIsRepeatedEverySecond) {
-  SchedulerBench bench(table_of(1'000'000));
-  lose_newcomers(bench);
-  const auto probe = only<SendProbe>(bench.join_as("faulty", 4, 10)).at(0);
-  const auto failed =
-      bench.feed(ResultsReceived{4, kProbeStudy, probe.lease, 1, true, 0.1, {{0, true}}});
-  EXPECT_TRUE(only<SendProbe>(failed).empty());
-  EXPECT_TRUE(only<SendBatch>(failed).empty());
-  EXPECT_EQ(only<SendProbe>(bench.pass(1000, {4})).size(), 1U);
-}
-
-TEST(SchedulerLosses, AProbeThatNeverArrivedIsSentAgain) {
-  SchedulerBench bench(table_of(1'000'000));
-  lose_newcomers(bench);
-  const auto probe = only<SendProbe>(bench.join_as("sound", 4, 2)).at(0);
-  bench.pass(2750, {4});
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {}}).empty()) << "the probe may still be in transit";
-  bench.pass(250, {4});
-  EXPECT_TRUE(bench.feed(HeartbeatReceived{4, {probe.lease}}).empty());
-  EXPECT_EQ(only<SendProbe>(bench.feed(HeartbeatReceived{4, {}})).size(), 1U);
-}
-
-TEST(SchedulerLosses, ResultsWithoutALeaseAreNoAnswerToAProbe) {
-  SchedulerBench bench(table_of(100));
-  bench.join(1, 1);
-  bench.feed(ResultsReceived{1, 1, 0, 1, false, 1e-3, {{50, false}}});
-  EXPECT_FALSE(bench.scheduler.worker(1, bench.now_ms).is_proven);
 }
 
 TEST(SchedulerLosses, AHeartbeatWithLeaseZeroHoldsNoLease) {
@@ -118,11 +60,12 @@ TEST(SchedulerLosses, AHeartbeatWithLeaseZeroHoldsNoLease) {
   EXPECT_EQ(bench.scheduler.study(1).leased, 0U) << "the batch did not reach the worker";
 }
 
-TEST(SchedulerLosses, ABatchThatCouldNotBeSentMakesNeitherPointsNorWorkerSuspect) {
+TEST(SchedulerLosses, ABatchThatCouldNotBeSentIsNoLoss) {
   SchedulerBench bench(table_of(1));
   for (WorkerId worker = 1; worker <= 20; ++worker) {
     const auto sent = only<SendBatch>(bench.join_as("process", worker, 1));
-    ASSERT_EQ(sent.size(), 1U) << "the point is not suspect and the process not set aside";
+    ASSERT_EQ(sent.size(), 1U) << worker;
+    EXPECT_EQ(bench.scheduler.worker(worker, bench.now_ms).losses, 0U);
     EXPECT_EQ(sent[0].attempt, worker);
     bench.feed(WorkerUnreachable{worker, "gone", {sent[0].lease}});
   }
@@ -147,22 +90,6 @@ TEST(SchedulerLosses, AWorkerHoldsAtMostTwoBatchesMoreThanItHasSolved) {
   EXPECT_EQ(second.size(), 2U) << "the worker then holds three batches";
   EXPECT_EQ(only<SendBatch>(bench.solve(second.at(0))).size(), 2U)
       << "the worker then holds four batches";
-}
-
-TEST(SchedulerLosses, AProcessLostThreeTimesInARowIsSetAsideUntilItSolvesAProbe) {
-  SchedulerBench bench(table_of(1'000'000));
-  bench.solve(only<SendBatch>(bench.join_as("weak", 1, 1)).at(0));
-  for (const WorkerId worker : {2U, 3U, 4U}) {
-    EXPECT_EQ(only<SendBatch>(bench.join_as("weak", worker, 1)).size(), 1U);
-    bench.feed(WorkerUnreachable{worker});
-  }
-  auto effects = bench.join_as("weak", 5, 2);
-  EXPECT_TRUE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
-  EXPECT_EQ(bench.scheduler.worker(5, bench.now_ms).losses, 3U);
-  EXPECT_TRUE(only<SendBatch>(effects).empty());
-  effects = bench.solve_probe(only<SendProbe>(effects).at(0));
-  EXPECT_EQ(only<SendBatch>(effects).size(), 2U);
-  EXPECT_FALSE(bench.scheduler.worker(5, bench.now_ms).is_set_aside);
 }
 
 TEST(SchedulerLosses, ABatchThatEndsWithOpenPointsIsALossAndACompletelyAnsweredOneIsNot) {
@@ -190,32 +117,6 @@ TEST(SchedulerLosses, ANewConnectionOfAProcessEndsItsOldOneAtOnce) {
   EXPECT_EQ(only<SendBatch>(effects)[0].first_point(), lost.first_point());
 }
 
-TEST(SchedulerLosses, ANewWorkerThatReconnectsIsNotLost) {
-  SchedulerBench bench(table_of(1'000'000));
-  // Four processes each get a batch and reconnect. The new connection replaces the old connection.
-  for (const WorkerId worker : {1U, 2U, 3U, 4U}) {
-    const std::string process = "sound " + std::to_string(worker);
-    ASSERT_EQ(only<SendBatch>(bench.join_as(process, worker, 1)).size(), 1U);
-    bench.join_as(process, worker + 10, 0);
-  }
-  EXPECT_EQ(only<SendBatch>(bench.join_as("another", 30, 1)).size(), 1U);
-  EXPECT_FALSE(bench.scheduler.worker(30, bench.now_ms).is_set_aside);
-}
-
-TEST(SchedulerLosses, PointsAreNoLongerSuspectWhenTheirWorkersReturn) {
-  SchedulerSettings settings;
-  settings.tail_batches_per_thread = 0;
-  SchedulerBench bench(table_of(4), settings);
-  for (const WorkerId worker : {1U, 2U}) {
-    EXPECT_EQ(only<SendBatch>(bench.join_as(std::to_string(worker), worker, 1)).size(), 1U);
-    bench.feed(WorkerUnreachable{worker});
-  }
-  EXPECT_TRUE(bench.join(3, 1).empty()) << "a new worker gets no suspect points";
-  const auto given = bench.join_as("1", 4, 0);
-  EXPECT_TRUE(only<SendBatch>(given).empty());
-  EXPECT_EQ(only<SendBatch>(bench.feed(CreditGiven{4, 1})).size(), 1U);
-}
-
 TEST(SchedulerLosses, AWorkerIsNotLostAfterExactlyItsLongestSilence) {
   SchedulerBench bench;
   bench.feed(WorkerJoined{1, 1});
@@ -227,92 +128,110 @@ TEST(SchedulerLosses, AWorkerIsNotLostAfterExactlyItsLongestSilence) {
   EXPECT_EQ(only<DropWorker>(bench.feed(Tick{})).size(), 1U);
 }
 
-TEST(WorkerProcesses, TheLatestAbsentProcessesAreKept) {
-  WorkerProcesses processes(2);
-  for (WorkerId worker = 1; worker < 100; ++worker) {
-    const std::string id = "process " + std::to_string(worker);
-    processes.leave(processes.join(id, worker), worker);
-    processes.leave(processes.join("", worker), worker);
-    processes.check_invariants(0);
-    EXPECT_LE(processes.size(), 2U);
-  }
-  EXPECT_EQ(processes.join("process 98", 100), 195U);
-  EXPECT_EQ(processes.join("process 2", 101), 199U) << "the process was removed from the list";
+// ---- Points that crash solvers ----
+
+constexpr int kCrash = 11;
+constexpr int kKill = 9;
+
+std::string process_of(WorkerId worker) {
+  return "process " + std::to_string(worker);
 }
 
-// ---- Points that kill workers ----
-
-/// Simulates a supervisor that starts a new worker process whenever a process dies. A worker dies
-/// when it solves a batch that contains a harmful point.
+/// Simulates workers whose parents start a new process whenever one crashes. A process solves the
+/// points of a batch in groups of eight and crashes when a group contains a harmful point.
 class Supervised {
  public:
   Supervised(SchedulerBench& bench, std::set<std::uint64_t> killers, std::uint32_t prefetch,
              const protocol::PointTable* table = nullptr)
       : bench_(bench), killers_(std::move(killers)), prefetch_(prefetch), table_(table) {}
 
-  void run() {
-    while (!finished && deaths < 1000) {
-      ++worker_;
-      held_.clear();
-      take(bench_.join_as("process " + std::to_string(worker_), worker_, prefetch_));
-      while (!finished && live()) {
-      }
+  /// Lets `workers` processes work at a time, in turn.
+  void run(std::size_t workers = 1) {
+    for (std::size_t i = 0; i < workers; ++i) {
+      start(std::nullopt);
+    }
+    for (int turn = 0; turn < 100'000 && !finished; ++turn) {
+      live(std::next(held_.begin(), turn % static_cast<int>(workers))->first);
     }
   }
 
   std::map<std::uint64_t, std::string> failed;  ///< reasons
-  int deaths = 0;
+  int crashes = 0;
   bool finished = false;
 
  private:
-  /// Lets the worker solve its probe or its next batch, or wait. Returns false if the worker dies.
-  bool live() {
-    if (probe_) {
-      take(bench_.solve_probe(*std::exchange(probe_, std::nullopt)));
-    } else if (held_.empty()) {
-      take(bench_.pass(250, {worker_}));
-    } else {
-      const SendBatch batch = held_.front();
-      held_.pop_front();
-      const bool kills = std::ranges::any_of(batch.points, [&](const Interval& range) {
-        const auto killer = killers_.lower_bound(range.begin);
-        return killer != killers_.end() && *killer < range.end;
-      });
-      if (kills) {
-        ++deaths;
-        take(bench_.feed(WorkerUnreachable{worker_}));
-        return false;
-      }
-      take(bench_.solve_and_store(batch, 1e-6, table_));
-      take(bench_.feed(CreditGiven{worker_, 1}));
+  void start(const std::optional<EndedProcess>& replaced) {
+    const WorkerId worker = ++last_worker_;
+    held_[worker];
+    take(bench_.join_as(process_of(worker), worker, prefetch_, replaced));
+  }
+
+  void live(WorkerId worker) {
+    if (held_[worker].empty()) {
+      take(bench_.pass(250, {worker}));
+      return;
     }
-    return true;
+    const SendBatch batch = held_[worker].front();
+    held_[worker].pop_front();
+    std::vector<std::uint64_t> group;
+    for (const PointOutcome& outcome : bench_.answer_to(batch, 0.0, table_).outcomes) {
+      group.push_back(outcome.point);
+      if (batch.study == 1 && killers_.contains(outcome.point)) {
+        ++crashes;
+        EndedProcess ended{process_of(worker), kCrash};
+        for (std::size_t i = group.size() - std::min<std::size_t>(8, group.size());
+             i < group.size(); ++i) {
+          ended.points.emplace(batch.study, group[i]);
+        }
+        held_.erase(worker);
+        take(bench_.feed(WorkerUnreachable{worker}));
+        start(ended);
+        return;
+      }
+    }
+    take(bench_.solve_and_store(batch, 1e-6, table_));
+    take(bench_.feed(CreditGiven{worker, 1}));
   }
 
   void take(const std::vector<Effect>& effects) {
-    for (const auto& batch : only<SendBatch>(effects)) {
-      held_.push_back(batch);
+    for (const Effect& effect : effects) {
+      if (const auto* batch = std::get_if<SendBatch>(&effect)) {
+        held_[batch->worker].push_back(*batch);
+      } else if (const auto* released = std::get_if<ReleaseBatch>(&effect)) {
+        std::erase_if(held_[released->worker], [&](const SendBatch& batch_held) {
+          return batch_held.lease == released->lease;
+        });
+        take(bench_.feed(CreditGiven{released->worker, 1}));
+      } else if (const auto* failure = std::get_if<StoreFailure>(&effect)) {
+        failed[failure->point] = failure->reason;
+        take(bench_.feed(ResultsStored{0, failure->study, 0, {{failure->point, true}}}));
+      } else if (const auto* end = std::get_if<StudyFinished>(&effect)) {
+        finished = finished || end->study == 1;
+      }
     }
-    for (const auto& probe : only<SendProbe>(effects)) {
-      probe_ = probe;
-    }
-    for (const auto& failure : only<StoreFailure>(effects)) {
-      failed[failure.point] = failure.reason;
-      take(bench_.feed(ResultsStored{0, failure.study, 0, {{failure.point, true}}}));
-    }
-    finished = finished || !only<StudyFinished>(effects).empty();
   }
 
   SchedulerBench& bench_;
   std::set<std::uint64_t> killers_;
   std::uint32_t prefetch_;
   const protocol::PointTable* table_;
-  WorkerId worker_ = 0;
-  std::deque<SendBatch> held_;
-  std::optional<SendProbe> probe_;
+  WorkerId last_worker_ = 0;
+  std::map<WorkerId, std::deque<SendBatch>> held_;
 };
 
-TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
+TEST(SchedulerCrashes, AHarmfulPointAmong4096CostsAtMostFourCrashes) {
+  for (const std::size_t workers : {1U, 2U, 5U}) {
+    SchedulerBench bench(table_of(4096));
+    Supervised supervised(bench, {1234}, 2);
+    supervised.run(workers);
+    EXPECT_LE(supervised.crashes, 4) << workers;
+    ASSERT_EQ(supervised.failed.size(), 1U);
+    EXPECT_EQ(supervised.failed[1234], "the solver crashed on this point: signal 11, twice");
+    EXPECT_EQ(bench.scheduler.study(1).solved(), 4095U);
+  }
+}
+
+TEST(SchedulerCrashes, HarmfulPointsAreFoundInAnyStudy) {
   const auto table = [](const protocol::Recipe& recipe) {
     return std::make_shared<const protocol::PointTable>(recipe);
   };
@@ -329,207 +248,317 @@ TEST(SchedulerSuspects, HarmfulPointsAreFoundWithFewLostWorkersInAnyStudy) {
     SchedulerSettings settings;
     settings.first_batch_points = 64;
     SchedulerBench bench(points, settings);
-    const std::set<std::uint64_t> killers{137, 777};
-    Supervised supervised(bench, killers, 3, points.get());
+    Supervised supervised(bench, {137, 777}, 3, points.get());
     supervised.run();
-    // Each harmful point kills at most nine workers: two until it is suspect, four while the
-    // scheduler divides 1000 points by eight, and three when the point is alone.
-    EXPECT_LE(supervised.deaths, 2 * (2 + 4 + 3));
+    EXPECT_LE(supervised.crashes, 2 * 3) << "one in a batch and two alone for each point";
     ASSERT_EQ(supervised.failed.size(), 2U);
     EXPECT_TRUE(supervised.failed.contains(137) && supervised.failed.contains(777));
-    EXPECT_NE(supervised.failed[137].find("worker was lost"), std::string::npos);
     const StudyCounts counts = bench.scheduler.study(1);
     EXPECT_EQ(counts.solved() + counts.left_out, 998U);
   }
 }
 
-TEST(SchedulerSuspects, AStudyOfOneHarmfulPointEndsToo) {
-  // The study has no second point with which a worker could show that it works. So each worker must
-  // first solve an easy point of the probe study.
+TEST(SchedulerCrashes, AStudyOfOneHarmfulPointCostsTwoCrashes) {
   SchedulerBench bench(table_of(1));
   Supervised supervised(bench, {0}, 2);
   supervised.run();
   EXPECT_TRUE(supervised.finished);
-  EXPECT_LE(supervised.deaths, 2 + 3);
+  EXPECT_EQ(supervised.crashes, 2);
   EXPECT_EQ(supervised.failed.size(), 1U);
 }
 
-/// Provides proven workers (each has solved a point) and open points.
-class SuspectTest : public testing::Test {
+/// Provides a study of 100 points. Worker 1 holds its first batch, of four points.
+class CrashTest : public testing::Test {
  protected:
-  /// Lets each of the workers 1 to `workers` solve one point of a study. `left` points of the study
-  /// remain open.
-  void prove(WorkerId workers, std::uint64_t left) {
-    bench_.feed(StudyAdded{1, table_of(workers + left), {}});
-    for (WorkerId worker = 1; worker <= workers; ++worker) {
-      bench_.solve_and_store(batches(bench_.join_as(name(worker), worker, 1)).at(0));
-      bench_.now_ms += 10;
-    }
-  }
-  static std::string name(WorkerId worker) { return "process " + std::to_string(worker); }
   static std::vector<SendBatch> batches(const std::vector<Effect>& effects) {
     return only<SendBatch>(effects);
   }
-  std::vector<SendBatch> credit(WorkerId worker) {
-    return batches(bench_.feed(CreditGiven{worker, 1}));
+  static EndedProcess crash(WorkerId worker, std::set<std::uint64_t> points, int signal = kCrash) {
+    EndedProcess ended{process_of(worker), signal};
+    for (const std::uint64_t point : points) {
+      ended.points.emplace(1, point);
+    }
+    return ended;
   }
-  static SchedulerSettings settings() {
-    SchedulerSettings settings;
-    settings.first_batch_points = 1;
-    settings.largest_batch_points = 1;
-    return settings;
+  /// Ends the connection of a worker, whose parent starts another process as `next`. Returns the
+  /// batches of the new process.
+  std::vector<SendBatch> replace(WorkerId worker, WorkerId next, const EndedProcess& ended) {
+    effects_ = bench_.feed(WorkerUnreachable{worker});
+    SchedulerBench::append(effects_, bench_.join_as(process_of(next), next, 1, ended));
+    auto given = batches(effects_);
+    if (worker > 1 && !given.empty() && given[0].first_point() != 2) {
+      bench_.solve_and_store(
+          given[0]);  // after a loss with a suspect point, other points come first
+      given = batches(bench_.feed(CreditGiven{next, 1}));
+    }
+    return given;
   }
+  std::vector<StoreFailure> failures() const { return only<StoreFailure>(effects_); }
 
-  SchedulerBench bench_{settings()};
+  SchedulerBench bench_{table_of(100)};
+  SendBatch first_ = batches(bench_.join_as(process_of(1), 1, 1)).at(0);
+  std::vector<Effect> effects_;  // of the last call of `replace`
 };
 
-TEST_F(SuspectTest, APointFailsAfterThreeProvenWorkersWereLostWithItAloneAndNoneReturned) {
-  prove(3, 1);
-  for (const WorkerId worker : {1U, 2U, 3U}) {
-    EXPECT_EQ(credit(worker).size(), 1U) << worker;
-    EXPECT_TRUE(only<StoreFailure>(bench_.feed(WorkerUnreachable{worker})).empty());
+TEST_F(CrashTest, ReportedPointsAreLeasedOneAtATimeAndFirst) {
+  auto next = replace(1, 2, crash(1, {1, 3}));
+  for (const std::uint64_t point : {1U, 3U}) {
+    ASSERT_EQ(next.size(), 1U);
+    EXPECT_EQ(next[0].first_point(), point);
+    EXPECT_EQ(next[0].count(), 1U);
+    EXPECT_EQ(next[0].attempt, 2U);
+    EXPECT_TRUE(bench_.feed(CreditGiven{2, 1}).empty()) << "the worker holds a suspect point";
+    next = batches(bench_.solve_and_store(next[0]));
   }
-  EXPECT_TRUE(only<StoreFailure>(bench_.pass(9750)).empty())
-      << "one of the workers may still return";
-  const auto failures = only<StoreFailure>(bench_.pass(250));
-  ASSERT_EQ(failures.size(), 1U);
-  EXPECT_EQ(failures[0].point, 3U);
-  EXPECT_EQ(failures[0].attempt, 3U);
+  ASSERT_EQ(next.size(), 1U);
+  EXPECT_EQ(next[0].first_point(), 0U);
 }
 
-TEST_F(SuspectTest, APointDoesNotFailWhenOneOfItsThreeWorkersReturns) {
-  prove(3, 1);
-  for (const WorkerId worker : {1U, 2U, 3U}) {
-    credit(worker);
-    bench_.feed(WorkerUnreachable{worker});
+TEST_F(CrashTest, AReportIsAcceptedBeforeTheLossOfTheProcessIsNoticed) {
+  const auto effects = bench_.join_as(process_of(2), 2, 1, crash(1, {2}));
+  ASSERT_EQ(only<DropWorker>(effects).size(), 1U);
+  EXPECT_EQ(only<DropWorker>(effects)[0].worker, 1U);
+  EXPECT_EQ(batches(effects).at(0).first_point(), 2U);
+  EXPECT_EQ(bench_.scheduler.worker(2, bench_.now_ms).losses, 1U);
+}
+
+TEST_F(CrashTest, AReportThatIsRepeatedCountsOnce) {
+  const EndedProcess report = crash(1, {2});
+  SendBatch alone = replace(1, 2, report).at(0);
+  const EndedProcess second = crash(2, {2});
+  alone = replace(2, 3, second).at(0);
+  for (WorkerId worker = 4; worker < 10; ++worker) {  // the process reconnects
+    effects_ = bench_.join_as(process_of(3), worker, 1, second);
+    ASSERT_EQ(batches(effects_).size(), 1U);
+    EXPECT_EQ(batches(effects_)[0].first_point(), 2U);
+    EXPECT_TRUE(failures().empty());
   }
-  bench_.pass(5000);
-  const auto again = batches(bench_.join_as(name(2), 12, 1));
-  ASSERT_EQ(again.size(), 1U) << "the worker is still proven";
-  EXPECT_TRUE(only<StoreFailure>(bench_.pass(20'000, {12})).empty());
-  bench_.solve_and_store(again[0]);
+}
+
+TEST_F(CrashTest, AReportOfPointsThatTheProcessDidNotHoldIsIgnored) {
+  const auto next = replace(1, 2, crash(1, {50, 99, 100, UINT64_MAX}));
+  EXPECT_EQ(next.at(0).count(), 4U);
+  EndedProcess other{"another process", kCrash};
+  other.points.emplace(1, 0);
+  bench_.join_as("malicious", 7, 1, other);
+  EXPECT_EQ(batches(bench_.solve_and_store(next[0])).size(), 0U);
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
 
-TEST_F(SuspectTest, RepeatedLossesOfOneProcessDoNotFailAPoint) {
-  prove(1, 1);
-  credit(1);
-  bench_.feed(WorkerUnreachable{1});
-  for (WorkerId worker = 2; worker < 20; ++worker) {
-    auto effects = bench_.join_as(name(1), worker, 1);
-    const auto probes = only<SendProbe>(effects);
-    if (!probes.empty()) {
-      effects = bench_.solve_probe(probes[0]);
-    }
-    ASSERT_EQ(batches(effects).size(), 1U);
-    EXPECT_TRUE(only<StoreFailure>(bench_.feed(WorkerUnreachable{worker})).empty());
-  }
-  EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
+TEST_F(CrashTest, AReportOfSolvedPointsOrOfADeletedStudyIsIgnored) {
+  bench_.store(ResultsReceived{1, 1, first_.lease, 1, false, 1e-3, {{2, false}}});
+  EXPECT_EQ(replace(1, 2, crash(1, {2})).at(0).count(), 2U) << "points 0 and 1 are one batch";
+  bench_.feed(WorkerUnreachable{2});
+  bench_.feed(StudyRemoved{1});
+  EXPECT_TRUE(bench_.join_as(process_of(3), 3, 1, crash(2, {0})).empty());
 }
 
-TEST_F(SuspectTest, TheLossOfAWorkerWithTwoPointsMakesNeitherPointRisky) {
-  prove(5, 2);
-  for (WorkerId worker = 1; worker <= 5; ++worker) {
-    bench_.feed(CreditGiven{worker, 2});
-    bench_.feed(WorkerUnreachable{worker});
-    // The process returns, so neither point becomes suspect and the next worker gets both.
-    bench_.join_as(name(worker), worker + 10, 0);
-  }
-  EXPECT_TRUE(only<StoreFailure>(bench_.pass(60'000)).empty());
+TEST_F(CrashTest, AWorkerThatGotTheReportedPointsMeanwhileMustDropThem) {
+  bench_.join_as("other", 5, 1);
+  bench_.feed(CreditGiven{5, 1});
+  const auto taken = batches(bench_.feed(WorkerUnreachable{1}));
+  bench_.feed(WorkerLeft{5});
+  const auto again = batches(bench_.join_as("third", 6, 1));
+  ASSERT_EQ(again.at(0).first_point(), 0U);
+  const auto effects = bench_.join_as(process_of(2), 2, 1, crash(1, {2}));
+  ASSERT_EQ(only<ReleaseBatch>(effects).size(), 1U);
+  EXPECT_EQ(only<ReleaseBatch>(effects)[0].lease, again[0].lease);
+  EXPECT_EQ(batches(effects).at(0).first_point(), 2U);
 }
 
-TEST_F(SuspectTest, ARiskyPointIsReservedForTheLongestProvenWorkerForSomeSeconds) {
-  for (const bool comes : {true, false}) {
-    bench_ = SchedulerBench(settings());
-    prove(3, 1);
-    credit(3);
-    bench_.feed(WorkerUnreachable{3});
-    EXPECT_TRUE(credit(2).empty());
-    if (comes) {
-      EXPECT_EQ(credit(1).size(), 1U);
-      continue;
-    }
-    EXPECT_TRUE(batches(bench_.pass(9750, {1, 2})).empty());
-    const auto given = batches(bench_.pass(250, {1, 2}));
-    ASSERT_EQ(given.size(), 1U);
-    EXPECT_EQ(given[0].worker, 2U);
+TEST_F(CrashTest, APointFailsAtTheSecondCrashThatItHadAloneAndAKillDoesNotCount) {
+  WorkerId worker = 1;
+  SendBatch alone = replace(1, 2, crash(1, {2})).at(0);
+  for (worker = 2; worker < 6; ++worker) {  // killed from outside
+    alone = replace(worker, worker + 1, crash(worker, {}, kKill)).at(0);
+    EXPECT_EQ(alone.first_point(), 2U);
   }
+  alone = replace(6, 7, crash(6, {2}, 6)).at(0);
+  EXPECT_EQ(alone.first_point(), 2U);
+  EXPECT_TRUE(failures().empty());
+  replace(7, 8, crash(7, {2}));
+  ASSERT_EQ(failures().size(), 1U);
+  EXPECT_EQ(failures()[0].point, 2U);
+  EXPECT_EQ(failures()[0].reason, "the solver crashed on this point: signal 6, then 11");
+  EXPECT_EQ(failures()[0].attempt, 7U);
 }
 
-TEST(SchedulerSuspects, SuspectPointsGoToAProvenWorkerThatHoldsNothingElse) {
-  SchedulerBench bench(table_of(1000));
-  // After two lost workers the points of their batches are suspect.
-  for (const WorkerId worker : {1U, 2U}) {
-    EXPECT_EQ(bench.join(worker, 2).size(), 2U);
-    bench.pass(3250);
-  }
-  const auto fresh = bench.join(3, 5);
-  ASSERT_EQ(fresh.size(), 2U) << "a new worker gets only two of the other batches";
-  EXPECT_EQ(fresh[0].attempt, 1U);
-  bench.solve(fresh[0]);
-  const auto suspect = only<SendBatch>(bench.solve(fresh[1]));
-  ASSERT_EQ(suspect.size(), 1U);
-  EXPECT_EQ(suspect[0].attempt, 3U);
-  EXPECT_EQ(suspect[0].first_point(), 0U);
+TEST_F(CrashTest, APointWhoseResultHasArrivedDoesNotFail) {
+  SendBatch alone = replace(1, 2, crash(1, {2})).at(0);
+  alone = replace(2, 3, crash(2, {2})).at(0);
+  bench_.feed(WorkerUnreachable{3});
+  bench_.join_as("another", 9, 1);
+  bench_.feed(ResultsReceived{9, 1, 0, 1, false, 1e-3, {{2, false}}});
+  effects_ = bench_.join_as(process_of(4), 4, 0, crash(3, {2}));
+  EXPECT_TRUE(failures().empty());
 }
 
-TEST(SchedulerSuspects, ThePartsOfASplitIntervalStaySuspect) {
-  SchedulerSettings settings;
-  settings.first_batch_points = 32;
-  settings.tail_batches_per_thread = 0;
-  SchedulerBench bench(settings);
-  bench.feed(StudyAdded{1, table_of(33), IntervalSet(32, 33)});
-  for (const WorkerId worker : {1U, 2U}) {
-    EXPECT_EQ(bench.join(worker, 2).at(0).count(), 32U);
-    bench.feed(WorkerUnreachable{worker});
+TEST_F(CrashTest, AnotherStudyContinuesWhileEachPointOfAStudyCrashesTheSolver) {
+  SchedulerBench bench(table_of(50));
+  bench.feed(StudyAdded{2, table_of(2000), {}});
+  std::set<std::uint64_t> all;
+  for (std::uint64_t point = 0; point < 50; ++point) {
+    all.insert(point);
   }
-  for (const WorkerId worker : {3U, 4U}) {
-    const auto probe = only<SendProbe>(bench.join_as("", worker, 2)).at(0);
-    const auto part = only<SendBatch>(bench.solve_probe(probe));
-    ASSERT_EQ(part.size(), 1U) << "a suspect batch is sent alone although two were requested";
-    EXPECT_EQ(part[0].count(), worker == 3 ? 4U : 1U);
-    bench.feed(WorkerUnreachable{worker});
-  }
+  Supervised supervised(bench, all, 2);
+  supervised.run();
+  EXPECT_GT(bench.scheduler.study(2).solved(), 200U);
+  EXPECT_EQ(supervised.failed.size(), 50U);
 }
 
-TEST(SchedulerSuspects, ABusyWorkerFinishesItsBatchesBeforeItGetsSuspectPoints) {
-  SchedulerBench bench(table_of(100'000));
-  bench.join(1, 1);
-  bench.pass(3250);
-  const auto second = bench.join(2, 1).at(0);
-  EXPECT_EQ(second.attempt, 2U);
-  const auto busy = bench.join(3, 2);  // worker 3 holds two ordinary batches
+TEST_F(CrashTest, ASuspectPointWaitsForAWorkerThatHoldsNothing) {
+  const auto busy = bench_.join(9, 2);
   ASSERT_EQ(busy.size(), 2U);
-  std::deque<SendBatch> held(busy.begin(), busy.end());
-  bench.pass(3250, {3});  // worker 2 is lost, so its points are suspect
-  EXPECT_FALSE(bench.scheduler.has_worker(2));
-  bool suspect_was_leased = false;
-  for (int i = 0; i < 200 && !held.empty() && !suspect_was_leased; ++i) {
-    const auto batch = held.front();
-    held.pop_front();
-    const auto solved = bench.solve(batch);
-    const auto given = bench.feed(CreditGiven{3, 1});
-    for (const auto& effects : {solved, given}) {
-      for (const auto& next : only<SendBatch>(effects)) {
-        suspect_was_leased = suspect_was_leased || next.first_point() == second.first_point();
-        held.push_back(next);
+  EXPECT_EQ(replace(1, 2, crash(1, {2})).size(), 1U);
+  bench_.feed(WorkerUnreachable{2});
+  EXPECT_TRUE(batches(bench_.solve(busy[0])).empty());
+  EXPECT_TRUE(batches(bench_.feed(CreditGiven{9, 2})).empty()) << "the worker holds a batch";
+  const auto next = batches(bench_.solve(busy[1]));
+  ASSERT_EQ(next.size(), 1U);
+  EXPECT_EQ(next[0].first_point(), 2U);
+}
+
+// ---- Points that end whole machines ----
+
+/// Provides a study of one point, and workers that are lost with it.
+class LostMachines : public testing::Test {
+ protected:
+  /// Lets a new worker get the point and be lost after `after_ms`.
+  std::vector<StoreFailure> lose(std::int64_t after_ms) {
+    ++worker_;
+    EXPECT_EQ(only<SendBatch>(bench_.join_as(process_of(worker_), worker_, 1)).size(), 1U);
+    bench_.now_ms += after_ms;
+    return only<StoreFailure>(bench_.feed(WorkerUnreachable{worker_}));
+  }
+  /// Loses workers until a point fails, at most `most`. Returns their number.
+  int losses_until_failure(std::int64_t after_ms, int most) {
+    for (int losses = 1; losses <= most; ++losses) {
+      if (const auto failures = lose(after_ms); !failures.empty()) {
+        reason_ = failures[0].reason;
+        return losses;
+      }
+    }
+    return most + 1;
+  }
+
+  static constexpr std::int64_t kMinute_ms = 60'000;
+  SchedulerBench bench_{table_of(1)};
+  WorkerId worker_ = 0;
+  std::string reason_;
+};
+
+TEST_F(LostMachines, APointFailsAfterFiveLossesAndTwentyThatItHadAlone) {
+  EXPECT_EQ(losses_until_failure(kMinute_ms, 100), 5 + 20);
+  EXPECT_EQ(reason_, "20 workers in a row were lost while they held only this point");
+}
+
+TEST_F(LostMachines, APointDoesNotFailWithinTenMinutes) {
+  EXPECT_EQ(losses_until_failure(1000, 1000), 5 + 601);
+}
+
+TEST_F(LostMachines, AWorkerThatReturnsOrLeavesEndsTheRow) {
+  for (const bool returns : {true, false}) {
+    for (int round = 0; round < 5; ++round) {
+      ASSERT_EQ(losses_until_failure(kMinute_ms, 19), 20);
+      if (returns) {
+        bench_.join_as(process_of(worker_), worker_ + 1000, 0);
+        bench_.feed(WorkerLeft{worker_ + 1000});
+      } else {
+        bench_.join(999 - static_cast<WorkerId>(round), 1);
+        bench_.feed(WorkerLeft{999 - static_cast<WorkerId>(round)});
       }
     }
   }
-  EXPECT_TRUE(suspect_was_leased);
 }
 
-TEST_F(SuspectTest, AWorkerThatFinishesBatchesWithoutResultsGetsOnlyThreeBatches) {
-  prove(1, 1);
-  auto effects = bench_.feed(CreditGiven{1, 1});
-  int rounds = 0;
-  for (; !batches(effects).empty() && rounds < 100; ++rounds) {
-    const auto batch = batches(effects).at(0);
-    bench_.feed(ResultsReceived{1, 1, batch.lease, ++bench_.sequence, true, 0.1, {}});
-    effects = bench_.feed(CreditGiven{1, 1});
+TEST_F(LostMachines, AWorkerThatReturnsEndsTheRowAlthoughAnotherHoldsThePoint) {
+  ASSERT_EQ(losses_until_failure(kMinute_ms, 24), 25);
+  const SendBatch batch = bench_.join(1000, 1).at(0);
+  bench_.join_as(process_of(worker_), 1001, 0);
+  EXPECT_TRUE(only<StoreFailure>(bench_.feed(WorkerUnreachable{1000})).empty());
+}
+
+TEST(SchedulerLosses, FiveLossesOfABatchMakeItsPointsBeLeasedAlone) {
+  SchedulerBench bench(table_of(1'000'000));
+  for (WorkerId worker = 1; worker <= 5; ++worker) {
+    EXPECT_EQ(bench.join(worker, 1).at(0).count(), 4U);
+    bench.feed(WorkerUnreachable{worker});
   }
-  EXPECT_EQ(rounds, 3);
-  EXPECT_EQ(only<StoreFailure>(bench_.pass(10'000, {1})).size(), 1U);
+  auto batch = bench.join(6, 2);
+  for (std::uint64_t point = 0; point < 4; ++point) {
+    ASSERT_EQ(batch.size(), 1U);
+    EXPECT_EQ(batch[0].first_point(), point);
+    EXPECT_EQ(batch[0].count(), 1U);
+    auto effects = bench.solve_and_store(batch[0]);
+    SchedulerBench::append(effects, bench.feed(CreditGiven{6, 1}));
+    batch = only<SendBatch>(effects);
+  }
+}
+
+TEST(SchedulerLosses, FiveHundredKilledWorkersFailNoPoint) {
+  // Two workers at a time, each with a life of 0.3 to 0.9 s, in which it solves at most one of its
+  // points.
+  SchedulerBench bench(table_of(200));
+  std::size_t failures = 0;
+  bool finished = false;
+  std::map<WorkerId, SendBatch> held;
+  const auto take = [&](const std::vector<Effect>& effects) {
+    failures += only<StoreFailure>(effects).size();
+    finished = finished || !only<StudyFinished>(effects).empty();
+    for (const SendBatch& batch : only<SendBatch>(effects)) {
+      held.insert_or_assign(batch.worker, batch);
+    }
+  };
+  WorkerId worker = 0;
+  for (int kills = 0; kills < 500; ++kills) {
+    ++worker;
+    take(bench.join_as(process_of(worker), worker, 1));
+    take(bench.pass(250 + 250 * (kills % 3), {worker, worker - 1}));
+    if (const auto batch = held.find(worker); batch != held.end() && kills % 4 == 0) {
+      take(bench.store(ResultsReceived{worker,
+                                       1,
+                                       batch->second.lease,
+                                       ++bench.sequence,
+                                       false,
+                                       0.1,
+                                       {{batch->second.first_point(), false}}}));
+    }
+    if (worker > 1) {
+      take(bench.feed(WorkerUnreachable{worker - 1}));
+    }
+  }
+  EXPECT_EQ(failures, 0U);
+  EXPECT_GT(bench.scheduler.study(1).solved(), 50U);
+}
+
+TEST(SchedulerLosses, AWorkerThatFinishesABatchWithoutResultsGetsNoneForAMinute) {
+  SchedulerBench bench(table_of(100));
+  const SendBatch batch = bench.join(1, 1).at(0);
+  const auto end = [&](const SendBatch& unsolved) {
+    bench.feed(ResultsReceived{1, 1, unsolved.lease, ++bench.sequence, true, 0.1, {}});
+    return only<SendBatch>(bench.feed(CreditGiven{1, 1}));
+  };
+  EXPECT_TRUE(end(batch).empty());
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).state, WorkerState::kStalled);
+  EXPECT_EQ(bench.scheduler.worker(1, bench.now_ms).losses, 1U);
+  EXPECT_TRUE(only<SendBatch>(bench.pass(59'000, {1})).empty());
+  EXPECT_EQ(only<SendBatch>(bench.pass(1000, {1})).size(), 1U);
+}
+
+TEST(SchedulerLosses, ALimitedNumberOfLostProcessesIsKept) {
+  SchedulerSettings settings;
+  settings.most_lost_processes = 3;
+  SchedulerBench bench(table_of(1'000'000), settings);
+  for (WorkerId worker = 1; worker <= 10; ++worker) {
+    bench.join_as(process_of(worker), worker, 1);
+    bench.feed(WorkerUnreachable{worker});
+  }
+  std::uint64_t kept = 0;
+  for (WorkerId worker = 1; worker <= 10; ++worker) {
+    bench.join_as(process_of(worker), 100 + worker, 0);
+    kept += bench.scheduler.worker(100 + worker, bench.now_ms).losses;
+  }
+  EXPECT_EQ(kept, 3U);
 }
 
 }  // namespace

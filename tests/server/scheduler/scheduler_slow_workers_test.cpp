@@ -27,9 +27,6 @@ TEST(SchedulerStall, AStudyEndsDespiteWorkersThatOnlySendHeartbeats) {
   bool is_finished = false;
   for (int step = 0; step < 40'000 && !is_finished; ++step) {
     std::vector<Effect> next = bench.pass(250, {1, 2, 3});
-    for (const SendProbe& probe : only<SendProbe>(effects)) {
-      SchedulerBench::append(next, bench.solve_probe(probe));  // idle workers solve probes too
-    }
     for (const SendBatch& batch : only<SendBatch>(effects)) {
       if (batch.worker == 3) {
         SchedulerBench::append(next, bench.solve_and_store(batch));
@@ -68,7 +65,7 @@ TEST_F(StallTest, AMinuteWithoutAResultEndsTheLeasesOfAWorker) {
   EXPECT_EQ(released[0].lease, batch_.lease);
   EXPECT_TRUE(only<DropWorker>(effects).empty());
   EXPECT_EQ(bench_.scheduler.study(1).leased, 0U);
-  EXPECT_TRUE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside);
+  EXPECT_EQ(bench_.scheduler.worker(1, bench_.now_ms).state, WorkerState::kStalled);
 }
 
 TEST_F(StallTest, PointsOfStalledWorkersAreNotSuspect) {
@@ -87,8 +84,8 @@ TEST_F(StallTest, LateResultsOfAStalledWorkerAreStoredOnce) {
   const auto again = bench_.join(2, 1);
   ASSERT_EQ(again.size(), 1U);
   EXPECT_EQ(only<StoreResults>(bench_.solve_and_store(batch_)).at(0).accepted.size(), 4U);
-  EXPECT_FALSE(bench_.scheduler.worker(1, bench_.now_ms).is_set_aside)
-      << "a slow worker is not set aside";
+  EXPECT_NE(bench_.scheduler.worker(1, bench_.now_ms).state, WorkerState::kStalled)
+      << "the worker is only slow";
   EXPECT_TRUE(only<StoreResults>(bench_.solve_and_store(again[0])).at(0).accepted.empty());
   EXPECT_EQ(bench_.scheduler.study(1).solved(), 4U);
 }
@@ -117,14 +114,14 @@ TEST_F(StallTest, TimeInWhichTheServerDidNotRunDoesNotCount) {
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U);
 }
 
-TEST_F(StallTest, AStalledWorkerGetsAProbeAndThenTwoBatches) {
-  bench_.feed(StudyAdded{2, table_of(1'000'000), {}});
-  bench_.feed(CreditGiven{1, 1024});
-  const auto probe = only<SendProbe>(bench_.pass(kMinute_ms + 1000, {1}));
-  ASSERT_EQ(probe.size(), 1U);
-  EXPECT_TRUE(only<SendBatch>(bench_.pass(kMinute_ms, {1})).empty())
-      << "the worker has not solved its probe";
-  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).size(), 2U);
+TEST_F(StallTest, AStalledWorkerGetsTwoBatchesAfterItStoredSomethingOrAMinute) {
+  for (const bool stores : {true, false}) {
+    bench_ = SchedulerBench(table_of(1'000'000), settings());
+    batch_ = bench_.join(1, 1).at(0);
+    bench_.feed(CreditGiven{1, 1024});
+    EXPECT_TRUE(only<SendBatch>(bench_.pass(kMinute_ms + 30'000, {1})).empty());
+    EXPECT_EQ(only<SendBatch>(stores ? bench_.solve(batch_) : bench_.pass(31'000, {1})).size(), 2U);
+  }
 }
 
 TEST(SchedulerStall, SlowPointsGetAMultipleOfTheFastestWorkersTime) {
@@ -175,34 +172,6 @@ TEST_F(StragglerTest, ABatchThatTakesTooLongIsGivenToASecondWorkerToo) {
   EXPECT_EQ(batch.count(), 4U);
   EXPECT_EQ(batch.attempt, 2U);
   EXPECT_EQ(bench_.scheduler.study(1).leased, 4U) << "points with two leases count once";
-}
-
-TEST_F(StragglerTest, AWorkerThatIsSetAsideSolvesAProbeAndThenHelps) {
-  SchedulerBench bench(settings());
-  bench.feed(StudyAdded{1, table_of(4), {}});
-  bench.join(1, 1);
-  // After three new workers are lost, each later new worker must solve a probe first.
-  for (const WorkerId id : {11U, 12U, 13U}) {
-    bench.feed(StudyAdded{id, table_of(1), {}});
-    bench.join_as("vanishes " + std::to_string(id), id, 1);
-    bench.feed(WorkerUnreachable{id});
-    bench.feed(StudyRemoved{id});
-  }
-  EXPECT_TRUE(only<SendProbe>(bench.join_as("sound", 2, 2)).empty())
-      << "no point is free, so no probe is sent";
-  std::vector<SendProbe> probes;
-  std::vector<SendBatch> batches;
-  for (int i = 0; i < 8 && batches.empty(); ++i) {
-    const auto effects = bench.pass(500, {1, 2});
-    for (const SendProbe& probe : only<SendProbe>(effects)) {
-      probes.push_back(probe);
-      bench.solve_probe(probe);
-    }
-    batches = only<SendBatch>(effects);
-  }
-  EXPECT_EQ(probes.size(), 1U);
-  ASSERT_EQ(batches.size(), 1U);
-  EXPECT_EQ(batches[0].worker, 2U);
 }
 
 TEST_F(StragglerTest, OnlyOpenPointsOfTheBatchGoToTheSecondWorker) {
@@ -281,17 +250,18 @@ TEST_F(StragglerTest, ABatchThatWaitsForAnotherOfItsWorkerGoesToASecondWorker) {
   EXPECT_EQ(taken[0].first_point(), waits.first_point());
 }
 
-TEST_F(StragglerTest, AHarmfulBatchIsFoundAlthoughTwoWorkersHeldIt) {
-  second();
-  bench_.feed(WorkerUnreachable{1});
-  bench_.join(3, 1);
-  EXPECT_TRUE(only<SendBatch>(bench_.pass(5000, {2, 3})).empty())
-      << "the batch was sent to a third worker";
-  const auto probe = only<SendProbe>(bench_.feed(WorkerUnreachable{2}));
-  // Two workers are lost. So the points are suspect, and only a proven worker may get them.
-  ASSERT_EQ(probe.size(), 1U);
-  EXPECT_EQ(only<SendBatch>(bench_.solve_probe(probe[0])).at(0).count(), 1U)
-      << "suspect points are sent one by one";
+TEST_F(StragglerTest, ACrashIsReportedAlthoughASecondWorkerHasTheBatch) {
+  SchedulerBench bench(table_of(4), settings());
+  const SendBatch first = only<SendBatch>(bench.join_as("one", 1, 1)).at(0);
+  bench.join(2, 1);
+  const SendBatch twin = only<SendBatch>(bench.pass(1500, {1, 2})).at(0);
+  ASSERT_EQ(twin.first_point(), first.first_point());
+  bench.feed(WorkerUnreachable{1});
+  const auto effects = bench.join_as("next", 3, 1, EndedProcess{"one", 11, {{1, 2}}});
+  EXPECT_EQ(only<ReleaseBatch>(effects).at(0).lease, twin.lease);
+  const auto alone = only<SendBatch>(effects);
+  EXPECT_EQ(alone.at(0).first_point(), 2U);
+  EXPECT_EQ(alone.at(0).count(), 1U);
 }
 
 TEST_F(StragglerTest, ForgettingAFailureEndsALeaseThatContainsThePoint) {

@@ -301,33 +301,13 @@ TEST(SchedulerTest, ReturningLeasesOfOthersOrUnknownOnesHasNoEffect) {
   EXPECT_EQ(bench.scheduler.worker(2, bench.now_ms).leased_points, 0U);
 }
 
-TEST(SchedulerTest, AReturnedSuspectPointStaysSuspect) {
-  SchedulerBench bench(table_of(1), trusting());
-  // The loss of two processes makes the point suspect.
-  bench.join_as("a", 1, 1);
-  bench.feed(WorkerUnreachable{1});
-  bench.join_as("b", 2, 1);
-  bench.feed(WorkerUnreachable{2});
-  auto effects = bench.join_as("c", 3, 2);
-  const auto probes = only<SendProbe>(effects);
-  ASSERT_EQ(probes.size(), 1U) << "a returned suspect point goes only to proven workers";
-  effects = bench.solve_probe(probes[0]);
-  const auto batches = only<SendBatch>(effects);
-  ASSERT_EQ(batches.size(), 1U);
-  bench.feed(BatchesReturned{3, {batches[0].lease}});
-  effects = bench.join_as("d", 4, 1);
-  EXPECT_TRUE(only<SendBatch>(effects).empty()) << "an unproven worker got the suspect point";
-}
-
-TEST(SchedulerTest, AReturnedProbeIsSentAgain) {
-  SchedulerBench bench(table_of(1), trusting());
-  bench.join_as("a", 1, 1);
-  bench.feed(WorkerUnreachable{1});
-  bench.join_as("b", 2, 1);
-  bench.feed(WorkerUnreachable{2});
-  const auto probe = only<SendProbe>(bench.join_as("c", 3, 2)).at(0);
-  bench.feed(BatchesReturned{3, {probe.lease}});
-  EXPECT_FALSE(only<SendProbe>(bench.pass(2000, {3})).empty());
+TEST(SchedulerTest, AnImpossiblyFastPaceLeadsToTheLargestBatch) {
+  SchedulerBench bench(table_of(1'000'000), trusting());
+  SendBatch batch = bench.join(1, 1).at(0);
+  for (int i = 0; i < 10; ++i) {
+    batch = bench.next_after(batch, 1e-310);
+  }
+  EXPECT_EQ(batch.count(), SchedulerSettings().largest_batch_points);
 }
 
 // ---- Cost of events with many workers and studies, measured in examined workers ----

@@ -159,15 +159,13 @@ class ServiceTest : public testing::Test {
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     for (const std::uint64_t i : points_of(batch)) {
-      if (batch.study_id() != 0 &&
-          !service_->states().record(batch.study_id()).table->passes_filter(i)) {
+      if (!service_->states().record(batch.study_id()).table->passes_filter(i)) {
         results.add_left_out(i);
         results.add_left_out(1);
         continue;
       }
-      *results.add_results() = i >= first_failed       ? protocol::failed_point(i, "for the test")
-                               : batch.study_id() == 0 ? solved_point(i)  // a probe
-                                                       : solved(i, batch.study_id());
+      *results.add_results() = i >= first_failed ? protocol::failed_point(i, "for the test")
+                                                 : solved(i, batch.study_id());
     }
     worker_sends(message, identity);
     write_all();

@@ -279,9 +279,7 @@ TEST_F(FilteredStudyTest, TheWorkerReportsLeftOutPointsAndSolvesTheOthers) {
 
 TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
   submit_filtered();
-  // Each invalid range ends the connection of its worker. From the fourth worker on, the batch is a
-  // probe, not points of the study. So the ranges that are invalid only in a batch of the study
-  // come first.
+  // Each invalid range ends the connection of its worker.
   const std::vector<std::vector<std::uint64_t>> wrong{
       {0, 12}, {11, 1}, {0}, {0, 0}, {3, ~std::uint64_t{0}}, {~std::uint64_t{0}, 2}, {0, 1, 5}};
   for (const auto& numbers : wrong) {

@@ -53,7 +53,7 @@ TEST_F(ServiceTest, ClientsGetAnErrorWhenTheDatabaseStoresNothingForSeconds) {
   EXPECT_EQ(status_of("a").waits_for(), "a worker");
 }
 
-TEST_F(ServiceTest, StatusShowsThatTheOnlyWorkerIsSetAside) {
+TEST_F(ServiceTest, StatusShowsThatTheOnlyWorkerHasStalled) {
   submit("a", 1);
   hello_and_credit();
   for (int second = 0; second < 80; ++second) {
@@ -146,18 +146,6 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
   EXPECT_THAT(change.results.at(2).error(), HasSubstr("duration_s"));
   write_all();
   EXPECT_EQ(service_->scheduler().study(1).failed, 2U);
-}
-
-TEST_F(ServiceTest, AWorkerWithWrongInputsIsNotProven) {
-  submit("a", 2);
-  hello_and_credit();
-  WorkerMessage message = results_of({0}, 1, last_message().batch().lease_id());
-  protocol::PointResult& result = *message.mutable_results()->mutable_results(0);
-  for (const bool is_right : {false, true}) {
-    result.set_h_m(solved(0).h_m() * (is_right ? 1.0 : 1.001));
-    worker_sends(message);
-    EXPECT_EQ(service_->scheduler().worker(1, now_.steady_ms).is_proven, is_right);
-  }
 }
 
 TEST_F(ServiceTest, InvalidFramesAreCountedAndClientsGetAnError) {
@@ -367,28 +355,17 @@ TEST_F(ServiceTest, PagesOfStudiesContainEachStudyOnce) {
   EXPECT_EQ(statuses(0, 1'000'000).studies_size(), 1000);
 }
 
-// ---- Worker processes and probes ----
+// ---- Worker processes ----
 
 class ProcessesTest : public ServiceTest {
  protected:
+  /// Says hello as the process `process_id`, which replaces the process of `ended`.
   void hello_as(const std::string& identity, const std::string& process_id,
-                const std::string& name = "lab") {
+                const protocol::EndedProcess& ended = {}) {
     WorkerMessage message = hello_of(protocol::kProtocolVersion, "1.0");
-    message.mutable_hello()->set_name(name);
     message.mutable_hello()->set_process_id(process_id);
+    *message.mutable_hello()->mutable_replaced() = ended;
     worker_sends(message, identity);
-  }
-  /// Makes three new workers join, get batches and vanish.
-  void let_newcomers_vanish() {
-    for (const char* identity : {"x", "y", "z"}) {
-      hello_as(identity, identity);
-      credit(1, identity);
-      EXPECT_TRUE(last_message().has_batch());
-      ports_.unreachable = identity;
-      now_.steady_ms += 1200;
-      service_->tick(now_);
-    }
-    ports_.unreachable.clear();
   }
 };
 
@@ -397,33 +374,29 @@ TEST_F(ProcessesTest, TheStatusOfAWorkerCountsTheLossesOfItsProcess) {
   hello_as("first", "process 1");
   credit(2, "first");
   hello_as("second", "process 1");
-  const auto worker = workers().workers(0);
-  EXPECT_EQ(worker.losses(), 2U);
-  EXPECT_FALSE(worker.proven());
-  EXPECT_FALSE(worker.set_aside());
+  EXPECT_EQ(workers().workers(0).losses(), 2U);
 }
 
-TEST_F(ProcessesTest, AProbeIsAValidStudyOfOnePointWhoseResultIsAcknowledged) {
-  submit("a", 100);
-  let_newcomers_vanish();
-  hello_as("worker", "sound");
-  EXPECT_TRUE(workers().workers(0).set_aside());
-  credit(1);
-  ASSERT_TRUE(last_message().has_batch());
-  const auto batch = last_message().batch();
-  EXPECT_EQ(batch.study_id(), 0U);
-  EXPECT_EQ(points_of(batch).size(), 1U);
-  const auto& definition = ports_.worker_messages.at(ports_.worker_messages.size() - 2);
-  ASSERT_TRUE(definition.has_study());
-  EXPECT_EQ(definition.study().study_id(), 0U);
-  EXPECT_EQ(protocol::PointTable(definition.study().recipe()).size(), 1U);
-  answer_batch(1);
-  EXPECT_TRUE(last_message().has_results_stored());
-  EXPECT_TRUE(workers().workers(0).proven());
-  EXPECT_EQ(workers().workers(0).solved_points(), 0U);
-  credit(1);
-  ASSERT_TRUE(last_message().has_batch());
-  EXPECT_EQ(last_message().batch().study_id(), 1U);
+TEST_F(ProcessesTest, APointOnWhichTheSolverCrashedTwiceFailsWithTheSignal) {
+  submit("a", 1);
+  hello_as("0", "process 0");
+  credit(1, "0");
+  for (const int life : {1, 2}) {
+    protocol::EndedProcess ended;
+    ended.set_process_id("process " + std::to_string(life - 1));
+    ended.set_signal(11);
+    ended.add_points(1);
+    ended.add_points(0);
+    hello_as(std::to_string(life), "process " + std::to_string(life), ended);
+    credit(1, std::to_string(life));
+    EXPECT_EQ(last_message().has_batch(), life == 1);
+  }
+  const auto* const change = std::get_if<AddResults>(&ports_.jobs.at(0).change);
+  ASSERT_NE(change, nullptr);
+  EXPECT_EQ(change->results.at(0).error(), "the solver crashed on this point: signal 11, twice");
+  write_all();
+  EXPECT_EQ(status_of("a").failed(), 1U);
+  EXPECT_EQ(workers().workers(0).losses(), 2U);
 }
 
 }  // namespace

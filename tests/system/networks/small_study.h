@@ -37,7 +37,7 @@ inline void print_measured(const std::string& what, std::chrono::steady_clock::t
 }
 
 /// Expects that `client` reports the end of the study, that each point has one row and none failed,
-/// and that no worker is set aside. `workers` returns the output of `oblique workers --format
+/// and that no worker has stalled. `workers` returns the output of `oblique workers --format
 /// json`.
 inline void expect_completed(Process& client, const Database& database,
                              const std::function<std::string()>& workers) {
@@ -49,7 +49,7 @@ inline void expect_completed(Process& client, const Database& database,
             kManyPoints);
   EXPECT_EQ(database.rows(), kManyPoints);
   for (const auto& worker : nlohmann::json::parse(workers())) {
-    EXPECT_NE(worker.at("standing"), "set aside") << worker;
+    EXPECT_NE(worker.at("state"), "stalled") << worker;
   }
 }
 

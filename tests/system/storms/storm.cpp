@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kBetweenCuts{150};
 constexpr int kShortestLife_ms = 20;
-constexpr int kLongestLife_ms = 300;
+constexpr int kLongestLife_ms = 900;
 constexpr std::uint32_t kRequestedBatches = 1000;
 
 const std::vector<std::string> kOneThread{"--threads", "1"};
@@ -62,7 +62,7 @@ bool vanish_with_points(const std::string& server_url, const std::string& solver
     if (!socket.recv(frame) || !protocol::decode(frame.to_string_view(), message)) {
       return false;
     }
-    if (message.has_batch() && message.batch().study_id() != 0) {
+    if (message.has_batch()) {
       return true;
     }
   }
@@ -102,6 +102,9 @@ void Storm::kill_workers(const std::stop_token& stop) {
     Worker worker(folder_, server_url_, kOneThread, environment_);
     const auto life_ms = static_cast<int>(random() % (kLongestLife_ms - kShortestLife_ms));
     std::this_thread::sleep_for(milliseconds(kShortestLife_ms + life_ms));
+    for (const pid_t solver : children_of(worker.pid())) {
+      kill(solver, faults_ % 2 == 0 ? SIGKILL : SIGCONT);  // else it leaves when its parent ends
+    }
     worker.send(SIGKILL);
     worker.wait();
     ++faults_;

@@ -41,9 +41,6 @@ class StormTest : public ::testing::Test {
     EXPECT_TRUE(filter.empty() ? left_in == all : left_in < all) << left_in;
     EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status = 'solved'"), left_in);
     EXPECT_EQ(database_.number("SELECT count(*) FROM results WHERE status <> 'solved'"), 0);
-    const Outcome workers =
-        run_oblique(folder_, {"workers", "--server", server.client_url(), "--format", "csv"});
-    EXPECT_NE(workers.out.find(",proven"), std::string::npos) << workers.out;
   }
 
  private:

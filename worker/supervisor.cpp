@@ -1,0 +1,127 @@
+#include "worker/supervisor.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <random>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
+#include "proto/system/descriptor.h"
+
+namespace oblique::worker {
+namespace {
+
+/// Signals that report an error of the program. Other signals come from outside.
+constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
+
+/// 128 random bits in hexadecimal digits.
+std::string random_id() {
+  std::random_device source;
+  return fmt::format("{:08x}{:08x}{:08x}{:08x}", source(), source(), source(), source());
+}
+
+void check_call(bool is_done, const char* what) {
+  if (!is_done) {
+    throw std::system_error(errno, std::generic_category(), what);
+  }
+}
+
+/// Adds the points that the child was solving. Adds none while a trace was being solved, because
+/// the trace may have caused the crash.
+void add_points(std::span<SolvingSlot> slots, protocol::EndedProcess& ended) {
+  for (const SolvingSlot& slot : slots) {
+    for (const std::uint64_t point : slot.points) {
+      if (point != 0 && &slot == &slots.front()) {
+        return;
+      }
+      if (point != 0) {
+        ended.add_points(slot.study_id);
+        ended.add_points((point & ~SolvingSlot::kFall) - 1);
+      }
+    }
+  }
+}
+
+/// Returns the pause before the next child, when `in_vain` children in a row have solved nothing.
+std::chrono::milliseconds pause_after(unsigned in_vain) {
+  constexpr unsigned kMostDoublings = 8;  // 12.8 s
+  return std::chrono::milliseconds(in_vain < 2 ? 0 : 50U << std::min(in_vain - 2, kMostDoublings));
+}
+
+}  // namespace
+
+std::span<SolvingSlot> make_shared_slots(std::size_t threads) {
+  void* const memory = mmap(nullptr, (threads + 1) * sizeof(SolvingSlot), PROT_READ | PROT_WRITE,
+                            MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  check_call(memory != MAP_FAILED, "no shared memory");
+  return {static_cast<SolvingSlot*>(memory), threads + 1};
+}
+
+int supervise(protocol::StopSignals& stop, std::span<SolvingSlot> slots,
+              const std::function<int(const protocol::WorkerHello& hello)>& work) {
+  constexpr const char* kNoProcess = "no process can be started to solve";
+  protocol::WorkerHello hello;
+  for (unsigned in_vain = 0; !stop.wait(pause_after(in_vain));) {
+    hello.set_process_id(random_id());
+    std::uninitialized_value_construct(slots.begin(), slots.end());
+    int ends[2];
+    check_call(pipe2(ends, O_CLOEXEC) == 0, kNoProcess);
+    const protocol::Descriptor alive(ends[0]);
+    protocol::Descriptor held(ends[1]);  // after the fork only the child keeps this end open
+    const pid_t parent = getpid();
+    const pid_t child = fork();
+    check_call(child >= 0, kNoProcess);
+    if (child == 0) {
+      // When memory runs out, the system ends this process rather than the parent.
+      std::ofstream("/proc/self/oom_score_adj") << "100";
+      return protocol::stop_with_parent(parent) ? work(hello) : 0;
+    }
+    held.close();
+    pollfd items[] = {{stop.descriptor(), POLLIN, 0}, {alive.number(), 0, 0}};
+    while (items[1].revents == 0) {
+      if (poll(items, std::size(items), -1) > 0 && items[0].revents != 0) {
+        stop.requested();
+        kill(child, SIGTERM);
+      }
+    }
+    int status = 0;
+    check_call(waitpid(child, &status, 0) == child, kNoProcess);
+    if (WIFEXITED(status)) {
+      return WEXITSTATUS(status);
+    }
+    protocol::EndedProcess ended;
+    ended.set_process_id(hello.process_id());
+    ended.set_signal(WTERMSIG(status));
+    if (std::ranges::count(kCrashes, ended.signal()) > 0) {
+      add_points(slots, ended);
+    }
+    spdlog::warn("signal {} ({}) ended the process that solves; another one starts", ended.signal(),
+                 strsignal(ended.signal()));
+    const auto has_solved = [](const SolvingSlot& slot) { return slot.solved > 0; };
+    in_vain = std::ranges::any_of(slots, has_solved) ? 0 : in_vain + 1;
+    // A child that solved nothing may have ended before it reported the end of the one before.
+    if (in_vain == 0 || ended.points_size() > 0) {
+      *hello.mutable_replaced() = std::move(ended);
+    }
+  }
+  return 0;
+}
+
+}  // namespace oblique::worker
