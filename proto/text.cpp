@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstddef>
 #include <numeric>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -183,6 +184,11 @@ std::string unknown_key(std::string_view name, std::span<const std::string_view>
 
 std::string joined(std::span<const std::string_view> names) {
   return fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string random_id() {
+  std::random_device bits;
+  return fmt::format("{:08x}{:08x}{:08x}{:08x}", bits(), bits(), bits(), bits());
 }
 
 }  // namespace oblique::protocol

@@ -52,4 +52,7 @@ std::string unknown_key(std::string_view name, std::span<const std::string_view>
 
 std::string joined(std::span<const std::string_view> names);
 
+/// Returns 128 random bits in hexadecimal digits.
+std::string random_id();
+
 }  // namespace oblique::protocol

@@ -7,8 +7,13 @@
 namespace oblique::worker {
 
 Batch::Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Range>& ranges,
-             std::shared_ptr<const protocol::PointTable> points, std::uint32_t attempt)
-    : number_(number), study_id_(study_id), points_(std::move(points)), attempt_(attempt) {
+             std::shared_ptr<const protocol::PointTable> points, std::uint32_t attempt,
+             std::string study_uid)
+    : number_(number),
+      study_id_(study_id),
+      study_uid_(std::move(study_uid)),
+      points_(std::move(points)),
+      attempt_(attempt) {
   for (const Range& range : ranges) {
     runs_.push_back({size_, range.begin});
     size_ += range.end - range.begin;

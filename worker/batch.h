@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "proto/oblique.pb.h"
@@ -21,10 +22,12 @@ class Batch {
   /// `number` is unique in this worker. Lease numbers are not: a restarted server repeats them.
   /// `attempt` counts the leases of the points.
   Batch(std::uint64_t number, std::uint64_t study_id, const std::vector<Range>& ranges,
-        std::shared_ptr<const protocol::PointTable> points, std::uint32_t attempt = 1);
+        std::shared_ptr<const protocol::PointTable> points, std::uint32_t attempt = 1,
+        std::string study_uid = {});
 
   std::uint64_t number() const { return number_; }
   std::uint64_t study_id() const { return study_id_; }
+  const std::string& study_uid() const { return study_uid_; }
   std::uint32_t attempt() const { return attempt_; }
   const protocol::PointTable& points() const { return *points_; }
 
@@ -49,6 +52,7 @@ class Batch {
 
   std::uint64_t number_;
   std::uint64_t study_id_;
+  std::string study_uid_;  ///< StudyDefinition.uid
   std::vector<Run> runs_;  ///< runs of consecutive points; each ends where the next begins
   std::uint64_t size_ = 0;
   std::shared_ptr<const protocol::PointTable> points_;
@@ -69,6 +73,7 @@ struct Progress {
   bool batch_done = false;                  ///< the batch has no further points
   std::vector<Batch::Range> left_out = {};  ///< points that did not pass the filter
   std::uint32_t attempt = 1;                ///< attempt of the batch
+  std::string study_uid = {};               ///< StudyDefinition.uid
 };
 
 }  // namespace oblique::worker

@@ -203,7 +203,8 @@ Progress& BatchSolver::progress_of(const Batch& batch) {
   return progress_
       .try_emplace(batch.number(), Progress{.batch = batch.number(),
                                             .study_id = batch.study_id(),
-                                            .attempt = batch.attempt()})
+                                            .attempt = batch.attempt(),
+                                            .study_uid = batch.study_uid()})
       .first->second;
 }
 

@@ -299,6 +299,7 @@ void Conversation::on(const protocol::StudyDefinition& definition) {
   try {
     studies_[definition.study_id()] =
         std::make_shared<const protocol::PointTable>(definition.recipe());
+    uids_[definition.study_id()] = definition.uid();
   } catch (const solver::InputError& error) {
     // The server accepted this recipe, so the server's release differs from the worker's. The
     // worker stops, because otherwise the points of the study would fail.
@@ -323,8 +324,8 @@ void Conversation::on(const protocol::Batch& batch) {
   backoff_ms_ = 0;
   held_[next_batch_] = {batch.study_id(), batch.lease_id()};
   last_work_ms_ = now_ms_;
-  effects_.emplace_back(
-      Solve{Batch(next_batch_++, batch.study_id(), *ranges, study->second, batch.attempt())});
+  effects_.emplace_back(Solve{Batch(next_batch_++, batch.study_id(), *ranges, study->second,
+                                    batch.attempt(), uids_[batch.study_id()])});
 }
 
 void Conversation::on(const protocol::ResultsStored& stored) {
@@ -377,6 +378,7 @@ void Conversation::report(Progress& progress) {
   const auto new_message = [&] {
     protocol::Results results;
     results.set_study_id(held.study_id);
+    results.set_study_uid(progress.study_uid);
     results.set_lease_id(held.lease_id);
     results.set_attempt(progress.attempt);
     return results;

@@ -241,7 +241,8 @@ class Conversation {
   std::string database_id_;
 
   std::map<std::uint64_t, std::shared_ptr<const protocol::PointTable>> studies_;
-  std::map<std::uint64_t, Held> held_;  ///< key: number of the batch
+  std::map<std::uint64_t, std::string> uids_;  ///< of the studies, by number
+  std::map<std::uint64_t, Held> held_;         ///< key: number of the batch
   std::uint64_t next_batch_ = 1;
   std::uint64_t first_batch_of_database_ = 1;  ///< earlier batches belong to another database
   std::uint32_t open_credit_ = 0;              ///< batches requested and not received yet

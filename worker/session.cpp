@@ -80,7 +80,9 @@ int Session::run(int stop_descriptor, const std::function<void()>& on_stop) {
     solver_.set_paused(!conversation_.may_solve());
   }
   link_.reset();
-  context_.close();  // waits for the goodbye, at most kLinger_ms
+  if (has_received_) {
+    context_.close();  // waits for the goodbye, at most kLinger_ms
+  }
   return *exit_code_;
 }
 

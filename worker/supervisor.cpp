@@ -15,7 +15,6 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
-#include <random>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -24,18 +23,13 @@
 #include <spdlog/spdlog.h>
 
 #include "proto/system/descriptor.h"
+#include "proto/text.h"
 
 namespace oblique::worker {
 namespace {
 
 /// Signals that report an error of the program. Other signals come from outside.
 constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
-
-/// 128 random bits in hexadecimal digits.
-std::string random_id() {
-  std::random_device source;
-  return fmt::format("{:08x}{:08x}{:08x}{:08x}", source(), source(), source(), source());
-}
 
 void check_call(bool is_done, const char* what) {
   if (!is_done) {
@@ -79,7 +73,7 @@ int supervise(protocol::StopSignals& stop, std::span<SolvingSlot> slots,
   constexpr const char* kNoProcess = "no process can be started to solve";
   protocol::WorkerHello hello;
   for (unsigned in_vain = 0; !stop.wait(pause_after(in_vain));) {
-    hello.set_process_id(random_id());
+    hello.set_process_id(protocol::random_id());
     std::uninitialized_value_construct(slots.begin(), slots.end());
     int ends[2];
     check_call(pipe2(ends, O_CLOEXEC) == 0, kNoProcess);

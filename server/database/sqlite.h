@@ -132,7 +132,7 @@ class Transaction {
 
 /// Values of PRAGMA application_id and PRAGMA user_version in our databases.
 inline constexpr std::int32_t kApplicationId = 0x6f626c71;  // "oblq"
-inline constexpr std::int32_t kSchemaVersion = 13;
+inline constexpr std::int32_t kSchemaVersion = 14;
 
 enum class DatabaseKind { kEmpty, kOurs };
 

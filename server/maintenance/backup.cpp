@@ -191,6 +191,9 @@ void copy_into(const DraftFile& draft, const std::string& from, const std::strin
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   copy_pages(source.get(), copy.get(), to);
   execute(copy.get(), "PRAGMA journal_mode = DELETE");
+  // Studies of the copy and of the original may get the same numbers later. The new ID makes
+  // workers drop results that are for the original.
+  execute(copy.get(), "UPDATE about SET database_id = lower(hex(randomblob(16)))");
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged and was not copied: " + faults.front());
   }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
 #include "worker/solver/model/parameters.h"
 
 namespace oblique::server {
@@ -49,12 +50,8 @@ struct Falls {
 
 /// Returns whether several points of the block may share a fall. A distribution may give each point
 /// its own fall.
-bool may_share_falls(const protocol::Block& block) {
-  const auto axes = protocol::model_axes(block);
-  return std::none_of(axes.begin(), axes.end(), [](const protocol::Axis* axis) {
-    return axis->has_distribution() &&
-           solver::changes_fall(protocol::axis_key(axis->key()), solver::ModelParameters());
-  });
+bool may_share_falls(const solver::ModelParameters& model, const protocol::Block& block) {
+  return std::ranges::none_of(protocol::fall_axes(model, block), &protocol::Axis::has_distribution);
 }
 
 }  // namespace
@@ -62,8 +59,10 @@ bool may_share_falls(const protocol::Block& block) {
 void PointOrder::arrange(const protocol::PointTable& table, std::uint64_t first,
                          const IntervalSet& open, std::uint64_t falls_a_group) {
   const auto& blocks = table.recipe().blocks();
+  const auto model = protocol::from_message(table.recipe().model());
   if (first != end_ || table.models() > kMaxModels ||
-      std::none_of(blocks.begin(), blocks.end(), may_share_falls)) {
+      std::none_of(blocks.begin(), blocks.end(),
+                   [&](const auto& block) { return may_share_falls(model, block); })) {
     return;
   }
   Falls falls(table, first, open);

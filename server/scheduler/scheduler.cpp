@@ -460,11 +460,10 @@ void Scheduler::on(Worker& worker, const ResultsReceived& event) {
   }
   const bool is_empty = event.outcomes.empty() && store.left_out.empty();
   effects_.emplace_back(std::move(store));
-  const auto lease = leases_.find(event.lease);
-  if (lease == leases_.end() || lease->second.worker != event.worker ||
-      lease->second.study != event.study) {
+  if (!has_lease(event.worker, event.lease, event.study)) {
     return;
   }
+  const auto lease = leases_.find(event.lease);
   const LeaseId twin = lease->second.twin;
   if (event.batch_done) {
     const bool is_solved = !has_open_points(lease->second);

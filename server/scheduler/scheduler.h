@@ -116,6 +116,10 @@ class Scheduler {
 
   bool has_worker(WorkerId worker) const { return workers_.contains(worker); }
   bool has_study(StudyId study) const { return studies_.contains(study); }
+  bool has_lease(WorkerId worker, LeaseId lease, StudyId study) const {
+    const auto found = leases_.find(lease);
+    return found != leases_.end() && found->second.worker == worker && found->second.study == study;
+  }
   std::size_t workers() const { return workers_.size(); }
   /// Returns the number of workers that dispatch has examined so far, which measures its cost.
   std::uint64_t examined_workers() const { return examined_workers_; }

@@ -67,7 +67,7 @@ void Service::worker_frame(const std::string& identity, std::string_view frame, 
       workers_.frame(identity, frame, now, holder == nullptr ? std::string() : holder->name);
   for (Event& event : input.events) {
     if (auto* received = std::get_if<ResultsReceived>(&event)) {
-      fail_wrong_inputs(*received, input.results);
+      check_inputs(*received, input.results);
     }
     handle(event, now, &input.results);
   }
@@ -124,18 +124,16 @@ void Service::feed(const Event& event, Instant now) {
 }
 
 void Service::handle(const Event& event, Instant now, protocol::Results* results) {
-  const Overloaded perform{[&](const DefineStudy& effect) {
-                             workers_.define(effect,
-                                             states_.record(effect.study).table.recipe_bytes());
-                           },
-                           [&](const StoreResults& effect) { store(effect, *results, now); },
-                           [&](const StoreFailure& effect) { store(effect, now); },
-                           [&](const DropWorker& effect) {
-                             workers_.drop(effect);
-                             clients_.worker_left(effect.worker);
-                           },
-                           [&](const StudyFinished& effect) { changes_.finish(effect.study, now); },
-                           [&](const auto& message) { workers_.send(message); }};
+  const Overloaded perform{
+      [&](const DefineStudy& effect) { workers_.define(effect, states_.record(effect.study)); },
+      [&](const StoreResults& effect) { store(effect, results, now); },
+      [&](const StoreFailure& effect) { store(effect, now); },
+      [&](const DropWorker& effect) {
+        workers_.drop(effect);
+        clients_.worker_left(effect.worker);
+      },
+      [&](const StudyFinished& effect) { changes_.finish(effect.study, now); },
+      [&](const auto& message) { workers_.send(message); }};
   for (const Effect& effect : scheduler_.handle(event, now.steady_ms)) {
     std::visit(perform, effect);
   }
@@ -152,22 +150,39 @@ void Service::handle_worker_events(Instant now) {
   }
 }
 
-void Service::fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const {
+/// Fails results with wrong inputs. Removes results of another study: their uid differs, or their
+/// inputs differ and no lease of this run shows that the worker has this study.
+void Service::check_inputs(ResultsReceived& event, protocol::Results& message) {
   // Without open points nothing is stored, so the inputs need no check and the table is not made.
   if (!states_.contains(event.study) || !scheduler_.has_study(event.study) ||
       scheduler_.study(event.study).open() == 0) {
     return;
   }
-  const StudyTable& table = states_.record(event.study).table;
-  for (std::size_t i = 0; i < event.outcomes.size(); ++i) {
-    protocol::PointResult& result = *message.mutable_results(static_cast<int>(i));
-    const std::string fault = result.point() < table.size()
-                                  ? protocol::fault_of_inputs(result, *table.get())
+  const StudyRecord& study = states_.record(event.study);
+  const bool has_lease = scheduler_.has_lease(event.worker, event.lease, event.study);
+  int kept = 0;
+  for (int i = 0; i < message.results_size() && message.study_uid() == study.uid; ++i) {
+    protocol::PointResult& result = *message.mutable_results(i);
+    const std::string fault = result.point() < study.table.size()
+                                  ? protocol::fault_of_inputs(result, *study.table.get())
                                   : std::string();
+    if (!fault.empty() && !has_lease) {
+      continue;
+    }
     if (!fault.empty()) {
       result = protocol::failed_point(result.point(), fault);
-      event.outcomes[i].failed = true;
     }
+    event.outcomes[static_cast<std::size_t>(kept)] = {result.point(), !result.error().empty()};
+    message.mutable_results()->SwapElements(kept++, i);
+  }
+  if (const int ignored = message.results_size() - kept; ignored > 0) {
+    stored_points_.ignored += static_cast<std::uint64_t>(ignored);
+    event.outcomes.resize(static_cast<std::size_t>(kept));
+    message.mutable_results()->DeleteSubrange(kept, ignored);
+    peer_log_.write(Severity::kWarning,
+                    fmt::format("worker {} sent {} results for another study than {}, as after a "
+                                "copy of the database was restored: they are ignored",
+                                event.worker, ignored, study.name));
   }
 }
 
@@ -180,26 +195,29 @@ void Service::hold_or_release_batches(Instant now) {
 
 // ---- The database ------------------------------------------------------------------------------
 
-void Service::store(const StoreResults& effect, protocol::Results& message, Instant now) {
-  WorkerRecord& worker = *workers_.find(effect.worker);
+void Service::store(const StoreResults& effect, protocol::Results* message, Instant now) {
+  WorkerRecord* const worker = workers_.find(effect.worker);
+  if (worker == nullptr || message == nullptr) {
+    return;  // without an acknowledgement a worker keeps its results
+  }
   const bool has_rows = !effect.accepted.empty() && states_.contains(effect.study);
-  if (has_rows && !std::exchange(worker.has_row, true)) {
+  if (has_rows && !std::exchange(worker->has_row, true)) {
     // The worker's row is stored with its first result.
-    ledger_.write(worker.row);
+    ledger_.write(worker->row);
   }
   AddResults change{effect.study,
                     has_rows ? states_.record(effect.study).table.get() : nullptr,
                     effect.worker,
-                    worker.row.solver_version,
-                    worker.row.instruction_set,
-                    message.attempt(),
+                    worker->row.solver_version,
+                    worker->row.instruction_set,
+                    message->attempt(),
                     iso_8601(now),
                     {},
                     effect.left_out,
-                    message.ByteSizeLong()};
+                    message->ByteSizeLong()};
   ResultsStored event{effect.worker, effect.study, effect.sequence, {}, effect.left_out};
   for (const std::size_t index : effect.accepted) {
-    protocol::PointResult& result = *message.mutable_results(static_cast<int>(index));
+    protocol::PointResult& result = *message->mutable_results(static_cast<int>(index));
     event.outcomes.push_back({result.point(), !result.error().empty()});
     change.results.push_back(std::move(result));
   }

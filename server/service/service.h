@@ -33,6 +33,7 @@ struct ServiceSettings : WorkerSessionSettings {
 struct StoredPoints {
   std::uint64_t solved = 0;
   std::uint64_t failed = 0;
+  std::uint64_t ignored = 0;  ///< not stored, because they were for another study
 };
 
 /// Dispatcher between message handlers, scheduler and writer. It has no sockets, clock or thread,
@@ -90,9 +91,9 @@ class Service {
   /// `results` is the message from which a ResultsReceived was made.
   void handle(const Event& event, Instant now, protocol::Results* results = nullptr);
   void handle_worker_events(Instant now);
-  void fail_wrong_inputs(ResultsReceived& event, protocol::Results& message) const;
+  void check_inputs(ResultsReceived& event, protocol::Results& message);
   void hold_or_release_batches(Instant now);
-  void store(const StoreResults& effect, protocol::Results& message, Instant now);
+  void store(const StoreResults& effect, protocol::Results* message, Instant now);
   void store(const StoreFailure& effect, Instant now);
   void write_results(AddResults change, ResultsStored event);
   void results_stored(const ResultsStored& event, Instant now);

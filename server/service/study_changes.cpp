@@ -34,10 +34,11 @@ std::string unknown_study(const std::string& name, const StudyStates& states) {
 
 ReadRequest read_request(std::string_view frame, bool validates_points) {
   ReadRequest read;
-  // A short frame is not checked for padding, because it cannot contain much.
-  read.is_readable =
-      (frame.size() <= limits::kLongestInlineRequest || protocol::is_unpadded_request(frame)) &&
-      protocol::decode(frame, read.request);
+  read.is_readable = protocol::is_request_within_limits(frame) &&
+                     protocol::decode(frame, read.request) &&
+                     (frame.size() <= limits::kLongestInlineRequest || read.request.has_submit() ||
+                      read.request.has_query());
+  read.request.DiscardUnknownFields();
   read.request_id = read.is_readable ? read.request.request_id() : protocol::request_id_of(frame);
   if (!read.is_readable || !read.request.has_submit()) {
     return read;
@@ -121,7 +122,7 @@ void StudyChanges::submit(const Client& client, const ReadRequest& read, Instant
   for (const std::string& reason : {protocol::study_name_error(request.name()),
                                     protocol::priority_error(priority), read.recipe_error}) {
     if (!reason.empty()) {
-      core_.ports.reply_error(client, reason);
+      core_.ports.reply_error(client, reason, protocol::ERROR_CODE_WRONG_REQUEST);
       return;
     }
   }
@@ -157,7 +158,9 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
   const std::string& name = read.request.submit().name();
   const std::string created_at = iso_8601(now);
   const bool reuses = should_look_up(read, {});
-  core_.states.add(id, {name, read.table, created_at, priority, {}, now.steady_ms, client.key()});
+  const std::string uid = protocol::random_id();
+  core_.states.add(id,
+                   {name, read.table, created_at, priority, {}, now.steady_ms, client.key(), uid});
   const auto on_stored = [this, client, id, reuses](Instant then) {
     StudyRecord& study = core_.states.record(id);
     study.is_durable = true;
@@ -173,7 +176,7 @@ void StudyChanges::add(const Client& client, const ReadRequest& read, std::int32
     reply.set_created(true);
     reply_submitted(client, id, std::move(reply), then);
   };
-  write(client, id, AddStudy{id, name, read.table, created_at, priority, client.key(), reuses},
+  write(client, id, AddStudy{id, name, read.table, created_at, priority, client.key(), reuses, uid},
         on_stored, [this, id] { core_.states.remove(id); });
 }
 
@@ -210,10 +213,9 @@ void StudyChanges::grow(const Client& client, StudyId id, const ReadRequest& rea
   const auto on_stored = [this, client, id, table = read.table, priority, points_before,
                           was = before.state(), reuses](Instant then) {
     StudyRecord& grown = core_.states.record(id);
-    grown.table = table;
     grown.priority = priority;
     grown.is_doubtful = false;
-    core_.states.reopen(id);
+    core_.states.grow(id, table);
     log(id, fmt::format("grows from {} to {} points", points_before, table.size()));
     if (reuses) {
       core_.feed(StudyHeld{id, true}, then);
@@ -254,7 +256,8 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
       study.set_state(kDeletedState);
       reply_changed(client, study);
     } else {
-      core_.ports.reply_error(client, unknown_study(request.study(), core_.states));
+      core_.ports.reply_error(client, unknown_study(request.study(), core_.states),
+                              protocol::ERROR_CODE_NO_SUCH_STUDY);
     }
     return;
   }
@@ -284,7 +287,7 @@ void StudyChanges::change(const Client& client, const protocol::ChangeRequest& r
     case protocol::STUDY_CHANGE_DELETE:
       return remove(client, id);
     default:
-      core_.ports.reply_error(client, "unknown kind of change");
+      core_.ports.reply_error(client, "unknown kind of change", protocol::ERROR_CODE_WRONG_REQUEST);
       break;
   }
 }
@@ -350,7 +353,7 @@ void StudyChanges::rename(const Client& client, const protocol::ChangeRequest& r
   const std::string& name = request.new_name();
   const auto owner = core_.states.find(name);
   if (const std::string reason = protocol::study_name_error(name); !reason.empty()) {
-    core_.ports.reply_error(client, reason);
+    core_.ports.reply_error(client, reason, protocol::ERROR_CODE_WRONG_REQUEST);
   } else if (owner == id) {
     reply_changed(client, study_status(id, core_, now));
   } else if (owner) {
@@ -500,7 +503,7 @@ void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant no
   if (part.points.empty()) {
     reuse.lookup->probes_in_vain += part.probes;
   } else {
-    *reuse.lookup = {now.steady_ms};
+    *reuse.lookup = {reuse.lookup->began_ms, now.steady_ms};
     core_.feed(PointsReused{id, part.points}, now);
   }
   if (lookups_stop_) {
@@ -508,7 +511,8 @@ void StudyChanges::part_stored(StudyId id, const ReusedResults& part, Instant no
   }
   const bool goes_on = part.next_point && core_.states.record(id).state != StudyState::kCancelled;
   reuse.cut_short = goes_on && (reuse.lookup->probes_in_vain >= kMaxProbesInVain ||
-                                now.steady_ms - reuse.lookup->last_result_ms >= kLongestInVain_ms);
+                                now.steady_ms - reuse.lookup->last_result_ms >= kLongestInVain_ms ||
+                                now.steady_ms - reuse.lookup->began_ms >= kLongestLookup_ms);
   if (goes_on && !reuse.cut_short) {
     write_part(id, *part.next_point);
   } else {

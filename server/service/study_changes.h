@@ -25,9 +25,8 @@ struct ReadRequest {
   bool needs_point_validation = false;  ///< true if the points must still be validated
 };
 
-/// Parses one frame, in time and memory proportional to its size: a long frame that is padded with
-/// empty messages is refused. If `validates_points`, also calls PointTable::validate_points, which
-/// may take a second.
+/// Parses one frame, unless the parsed message would need too much memory (frame_scan.h). If
+/// `validates_points`, also calls PointTable::validate_points, which may take a second.
 ReadRequest read_request(std::string_view frame, bool validates_points = true);
 
 /// Limits on the number of studies that are neither done nor cancelled, and of their points.
@@ -58,6 +57,8 @@ class StudyChanges {
   /// A lookup ends early after this number of probes, or after this time, without a result.
   static constexpr std::uint64_t kMaxProbesInVain = 1'000'000;
   static constexpr std::int64_t kLongestInVain_ms = 1500;
+  /// A lookup ends early after this time, even if it finds results.
+  static constexpr std::int64_t kLongestLookup_ms = 30'000;
   /// Looks up results of other studies for all open points, in parts. The scheduler must hold the
   /// study meanwhile. If the study is cancelled, the lookup ends after its current part.
   void look_up(StudyId id, Instant now);

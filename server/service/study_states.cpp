@@ -8,12 +8,20 @@
 namespace oblique::server {
 
 void StudyStates::move(StudyId id, StudyState state) {
-  studies_.at(id).state = state;
+  StudyRecord& study = studies_.at(id);
+  study.state = state;
   if (state == StudyState::kRunning || state == StudyState::kPaused) {
-    unfinished_.insert(id);
+    open_points_ += unfinished_.insert(id).second ? study.table.size() : 0;
   } else {
-    unfinished_.erase(id);
+    open_points_ -= unfinished_.erase(id) > 0 ? study.table.size() : 0;
   }
+}
+
+void StudyStates::grow(StudyId id, StudyTable table) {
+  StudyRecord& study = studies_.at(id);
+  open_points_ += is_open(id) ? table.size() - study.table.size() : 0;
+  study.table = std::move(table);
+  move(id, StudyState::kRunning);
 }
 
 std::array<std::uint64_t, kStudyStates> StudyStates::counts() const {
@@ -24,18 +32,10 @@ std::array<std::uint64_t, kStudyStates> StudyStates::counts() const {
   return counts;
 }
 
-std::uint64_t StudyStates::open_points() const {
-  std::uint64_t points = 0;
-  for (const StudyId id : unfinished_) {
-    points += record(id).table.size();
-  }
-  return points;
-}
-
 void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
   const bool lacks_rows = stored.completed.size() < stored.table.size();
-  StudyRecord study{stored.name,     stored.table, stored.created_at,  stored.priority,
-                    stored.failures, now_ms,       stored.submitted_by};
+  StudyRecord study{stored.name,     stored.table, stored.created_at,   stored.priority,
+                    stored.failures, now_ms,       stored.submitted_by, stored.uid};
   study.reuse.add(stored.reused);
   study.is_durable = true;
   add(stored.study_id, std::move(study));
@@ -47,12 +47,12 @@ void StudyStates::restore(const StoredStudy& stored, std::int64_t now_ms) {
 void StudyStates::add(StudyId id, StudyRecord record) {
   ids_.emplace(record.name, id);
   studies_.emplace(id, std::move(record));
-  unfinished_.insert(id);
+  move(id, StudyState::kRunning);
 }
 
 void StudyStates::remove(StudyId id) {
   const auto study = studies_.find(id);
-  unfinished_.erase(id);
+  move(id, StudyState::kCancelled);
   ids_.erase(study->second.name);
   studies_.erase(study);
 }

@@ -21,7 +21,8 @@ namespace oblique::server {
 /// Results of other studies that a study reuses.
 struct Reuse {
   struct Lookup {
-    std::int64_t last_result_ms;
+    std::int64_t began_ms;
+    std::int64_t last_result_ms = began_ms;
     std::uint64_t probes_in_vain = 0;
   };
   std::map<std::string, std::uint64_t> origins{};  ///< number of reused points, by source study
@@ -46,6 +47,7 @@ struct StudyRecord {
   IntervalSet failures{};      ///< points whose row has an error
   std::int64_t since_ms{};     ///< start of the period for the study's points per second
   std::string submitted_by{};  ///< name of the submitter's key; empty without keys
+  std::string uid{};           ///< AddStudy.uid
   Reuse reuse{};
   StudyState state = StudyState::kRunning;
   bool is_durable = false;
@@ -75,7 +77,7 @@ class StudyStates {
   std::optional<StudyId> durable_after(StudyId id) const;
   bool contains(StudyId id) const { return studies_.contains(id); }
   const StudyRecord& record(StudyId id) const { return studies_.at(id); }
-  /// Returns the record for changes. Name and state must be changed by their own functions.
+  /// Returns the record for changes. Name, state and table must be changed by their own functions.
   StudyRecord& record(StudyId id) { return studies_.at(id); }
   /// Returns whether the study is neither done nor cancelled.
   bool is_open(StudyId id) const { return unfinished_.contains(id); }
@@ -85,7 +87,7 @@ class StudyStates {
   /// Returns the numbers of the open studies.
   const std::set<StudyId>& unfinished() const { return unfinished_; }
   /// Returns the number of points of all open studies.
-  std::uint64_t open_points() const;
+  std::uint64_t open_points() const { return open_points_; }
   /// Returns whether any study has, or once had, results that others can reuse.
   bool have_results() const { return have_results_; }
   void note_results() { have_results_ = true; }
@@ -96,6 +98,8 @@ class StudyStates {
   /// Sets a state that is durable. A done study stays done until `reopen`.
   void set_state(StudyId id, StudyState state);
   void reopen(StudyId id) { move(id, StudyState::kRunning); }
+  /// Replaces the table by one with more points, and sets the state to running.
+  void grow(StudyId id, StudyTable table);
   /// Sets the state to done. Returns false if it was done already.
   bool finish(StudyId id);
 
@@ -110,6 +114,7 @@ class StudyStates {
   std::map<StudyId, StudyRecord> studies_;
   std::map<std::string, StudyId, std::less<>> ids_;  // by name
   std::set<StudyId> unfinished_;
+  std::uint64_t open_points_ = 0;  // number of points of the studies in `unfinished_`
   bool have_results_ = false;
 };
 

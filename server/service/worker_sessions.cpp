@@ -70,12 +70,12 @@ WorkerInput WorkerSessions::frame(const std::string& identity, std::string_view 
   WorkerInput input;
   const auto known = ids_.find(identity);
   protocol::WorkerMessage message;
-  // the size is checked before parsing
   const bool is_small = protocol::is_worker_frame_within_limits(frame);
   const bool is_read = is_small && protocol::decode(frame, message);
   const int lease_count =
       message.heartbeat().lease_ids_size() + message.give_back().lease_ids_size();
-  if (!is_small || lease_count > protocol::kMaxLeasesAHeartbeat) {
+  if (!is_small || lease_count > protocol::kMaxLeasesAHeartbeat ||
+      message.results().results_size() > protocol::kMaxResultsAMessage) {
     if (known == ids_.end()) {
       log_.bad_frame("a worker");
     } else {
@@ -321,14 +321,15 @@ void WorkerSessions::send(const ReleaseBatch& release) {
   send(release.worker, message);
 }
 
-void WorkerSessions::define(const DefineStudy& define, const std::string& recipe_bytes) {
-  protocol::StudyDefinition number;
-  number.set_study_id(define.study);
+void WorkerSessions::define(const DefineStudy& define, const StudyRecord& study) {
+  protocol::StudyDefinition rest;
+  rest.set_study_id(define.study);
+  rest.set_uid(study.uid);
   send_frame(define.worker,
              protocol::encode_around(
                  protocol::ServerToWorker(), protocol::ServerToWorker::kStudyFieldNumber,
-                 protocol::encode_around(number, protocol::StudyDefinition::kRecipeFieldNumber,
-                                         recipe_bytes)));
+                 protocol::encode_around(rest, protocol::StudyDefinition::kRecipeFieldNumber,
+                                         study.table.recipe_bytes())));
 }
 
 void WorkerSessions::notify_all(const std::string& text) {

@@ -12,6 +12,7 @@
 #include "proto/oblique.pb.h"
 #include "server/scheduler/scheduler_events.h"
 #include "server/service/ports.h"
+#include "server/service/study_states.h"
 #include "server/service/write_ledger.h"
 #include "server/store/changes.h"
 
@@ -71,7 +72,7 @@ class WorkerSessions {
     send_frame(worker, protocol::encode(message), lease);
   }
   /// Sends the stored bytes of the recipe, because encoding a long recipe for each worker is slow.
-  void define(const DefineStudy& define, const std::string& recipe_bytes);
+  void define(const DefineStudy& define, const StudyRecord& study);
   void notify_all(const std::string& text);
   /// Notifies all workers that the server stops, and also workers that join later.
   void stop();

@@ -47,6 +47,7 @@ struct AddStudy {
   std::int32_t priority = 0;
   std::string submitted_by = {};  ///< name of the submitter's key; empty without keys
   bool reuses = false;            ///< true if results of other studies are to be reused
+  std::string uid = {};           ///< random; different in each copy of the database
 };
 
 struct SetPriority {

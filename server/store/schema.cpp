@@ -1,7 +1,6 @@
 #include "server/store/schema.h"
 
 #include <map>
-#include <random>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -37,15 +36,6 @@ const std::map<std::string, std::string>& our_tables() {
   return kTables;
 }
 
-std::string random_id() {
-  std::random_device source;
-  std::string id;
-  for (int i = 0; i < 4; ++i) {
-    id += fmt::format("{:08x}", source());
-  }
-  return id;
-}
-
 }  // namespace
 
 void create_tables(sqlite3* database) {
@@ -53,7 +43,7 @@ void create_tables(sqlite3* database) {
   execute(database, kSchemaSql);
   execute(database, fmt::format("PRAGMA application_id = {}", kApplicationId));
   execute(database, fmt::format("PRAGMA user_version = {}", kSchemaVersion));
-  execute_with(database, "INSERT INTO about (database_id) VALUES (?)", random_id());
+  execute(database, "INSERT INTO about DEFAULT VALUES");
   transaction.commit();
 }
 

@@ -4,7 +4,7 @@
 
 -- One row. Workers compare database_id with that of the database that their results are for.
 CREATE TABLE about (
-  database_id TEXT NOT NULL,              -- random, set when the file is created
+  database_id TEXT NOT NULL DEFAULT (lower(hex(randomblob(16)))), -- random; `oblique backup` gives a copy a new one
   starts      INTEGER NOT NULL DEFAULT 0, -- number of times that a server has opened the file
   has_orphans INTEGER NOT NULL DEFAULT 0  -- 1: deleted studies may have left models and workers without rows
 ) STRICT;
@@ -23,6 +23,7 @@ CREATE TABLE studies (
   counted      INTEGER NOT NULL DEFAULT 1, -- 0: rows were deleted, so `completed_ranges` must be computed again
   left_out     INTEGER NOT NULL DEFAULT 0, -- number of completed points that `where` leaves out
   reuses       INTEGER NOT NULL DEFAULT 0, -- 1: the lookup of results of other studies has not ended
+  uid          TEXT NOT NULL DEFAULT (lower(hex(randomblob(16)))), -- random; a study of the same number in another copy of the file has another
   checksum     INTEGER               -- CRC-32 of study_id, recipe, points, errors and created_at; NULL after a change by hand
 ) STRICT;
 

@@ -215,12 +215,12 @@ void Store::add(const AddStudy& change) {
   recipe.ParseFromString(change.table.recipe_bytes());
   execute_with(database_.get(),
                "INSERT INTO studies (study_id, name, recipe, points, errors, state, created_at,"
-               " changed_at, priority, submitted_by, reuses, checksum)"
-               " VALUES (?1, ?2, ?3, ?4, ?5, 'running', ?6, ?6, ?7, nullif(?8, ''), ?9,"
+               " changed_at, priority, submitted_by, reuses, uid, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, ?5, 'running', ?6, ?6, ?7, nullif(?8, ''), ?9, ?10,"
                " row_checksum(?1, ?3, ?4, ?5, ?6))",
                change.study_id, change.name, Blob{change.table.recipe_bytes()}, change.table.size(),
                recipe.errors(), change.created_at, change.priority, change.submitted_by,
-               change.reuses);
+               change.reuses, change.uid);
 }
 
 void Store::add(const SetPriority& change) {

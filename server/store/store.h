@@ -33,6 +33,7 @@ struct StoredStudy {
   bool reuses = false;         ///< true if the lookup of other studies' results has not ended
   std::uint64_t left_out = 0;  ///< number of completed points that the study's filter leaves out
   std::map<std::string, std::uint64_t> reused{};  ///< number of reused results by source study
+  std::string uid{};                              ///< AddStudy.uid
 };
 
 /// The SQLite database (schema.sql), opened for writing. Only one Store can have a file open; other

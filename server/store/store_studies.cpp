@@ -26,7 +26,7 @@ constexpr const char* kStudies =
     "SELECT study_id, name, recipe, points, state, created_at, priority,"
     " coalesce(submitted_by, ''), reuses, left_out,"
     " coalesce((SELECT w.solver_version FROM results AS r CROSS JOIN workers AS w USING (worker_id)"
-    " WHERE r.study_id = s.study_id ORDER BY r.point LIMIT 1), '') FROM studies AS s"
+    " WHERE r.study_id = s.study_id ORDER BY r.point LIMIT 1), ''), uid FROM studies AS s"
     " ORDER BY study_id";
 
 StoredStudy study_in(const Statement& row) {
@@ -41,6 +41,7 @@ StoredStudy study_in(const Statement& row) {
   study.reuses = row.integer(8) != 0;
   study.left_out = row.number(9);
   study.solver_version = row.text(10);
+  study.uid = row.text(11);
   return study;
 }
 

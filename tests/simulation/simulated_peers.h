@@ -233,7 +233,8 @@ class SimulatedWorker {
                               1e-3 * static_cast<double>(busy_ms_),
                               false,
                               {},
-                              work.batch.attempt()};
+                              work.batch.attempt(),
+                              work.batch.study_uid()};
     work.batch.append_points(work.solved, position, progress.left_out);
     if (position < work.batch.size()) {
       const std::uint64_t point = work.batch.point_at(position);

@@ -27,7 +27,7 @@ namespace {
 /// Returns a batch of a study without a filter.
 Batch batch(std::uint64_t number, std::uint64_t first, std::uint64_t count,
             std::uint64_t study_id = 7) {
-  return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000)};
+  return {number, study_id, {{first, first + count}}, server::table_of(1'000'000'000), 1, "uid"};
 }
 
 /// Returns a batch of a study with a filter and a thousand points, with mu from 0 to 999.
@@ -113,6 +113,7 @@ TEST_F(BatchSolverTest, BatchesAreSolvedPointByPointInTheOrderTheyWereAdded) {
   const auto progress = solver_.collect();
   ASSERT_EQ(progress.size(), 2U);
   EXPECT_EQ(progress[0].batch, 1U);
+  EXPECT_EQ(progress[0].study_uid, "uid");
   ASSERT_EQ(progress[0].results.size(), 3U);
   EXPECT_EQ(progress[0].results[2].point(), 12U);
   EXPECT_TRUE(progress[0].batch_done);

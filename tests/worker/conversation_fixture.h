@@ -129,7 +129,8 @@ class ConversationTest : public ::testing::Test {
   /// Reports points `first` to `first + count − 1` of a batch as solved.
   void solve(std::uint64_t batch, std::uint64_t first, std::uint64_t count, bool batch_done,
              std::uint64_t study_id = 7) {
-    Progress progress{batch, study_id, {}, 0.5, batch_done};
+    Progress progress{batch,      study_id, {}, 0.5,
+                      batch_done, {},       1,  "uid " + std::to_string(study_id)};
     for (std::uint64_t i = 0; i < count; ++i) {
       progress.results.push_back(protocol::failed_point(first + i, "for the test"));
     }

@@ -162,6 +162,20 @@ TEST_F(ConversationTest, ResultsOfAnEarlierSessionBelongToNoLease) {
   EXPECT_FALSE(sent_results()[0].batch_done());
 }
 
+TEST_F(ConversationTest, ResultsHaveTheUidOfTheStudyForWhichTheyWereSolved) {
+  join_with_batch();
+  rejoin();
+  auto other_study = study_message(7);
+  other_study.mutable_study()->set_uid("another study of that number");
+  receive(other_study);
+  receive(batch_message(7, 32));
+  ASSERT_TRUE(has<Solve>());
+  EXPECT_EQ(effects_of<Solve>()[0].batch.study_uid(), "another study of that number");
+  solve(1, 0, 3, false);
+  ASSERT_EQ(sent_results().size(), 1U);
+  EXPECT_EQ(sent_results()[0].study_uid(), "uid 7");
+}
+
 TEST_F(ConversationTest, BatchesOfAnEarlierSessionAreDroppedAtTheWelcome) {
   join_with_batch();
   receive(hello_again_message());

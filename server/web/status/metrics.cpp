@@ -67,6 +67,8 @@ void add_progress(MetricText& out, const Snapshot& now) {
   out.sample(now.points_solved);
   out.counter("oblique_points_failed_total", "Points that were stored as failed.");
   out.sample(now.points_failed);
+  out.counter("oblique_results_ignored_total", "Results for another study, which were not stored.");
+  out.sample(now.results_ignored);
   out.gauge("oblique_points_open", "Points of running studies without a result.");
   out.sample(now.points_open);
   out.gauge("oblique_points_leased", "Points leased to workers.");
@@ -99,7 +101,7 @@ void add_workers(MetricText& out, const Snapshot& now) {
 
 void add_writer_and_disk(MetricText& out, const Snapshot& now, const DiskUsage& disk) {
   out.histogram("oblique_commit_duration_seconds", "Duration of a transaction.", now.commit_s);
-  out.gauge("oblique_writer_queue_bytes", "Results that are not durable yet.");
+  out.gauge("oblique_writer_queue_bytes", "Results that are not committed yet.");
   out.sample(now.writer_bytes);
   out.gauge("oblique_database_writable", "1: the database accepts results; 0: it does not.");
   out.sample(std::uint64_t{now.database_fault.empty() ? 1U : 0U});

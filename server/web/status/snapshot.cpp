@@ -62,6 +62,7 @@ Snapshot take_snapshot(const SnapshotSources& sources, std::int64_t now_ms) {
   snapshot.made_ms = now_ms;
   snapshot.points_solved = service.stored_points().solved;
   snapshot.points_failed = service.stored_points().failed;
+  snapshot.results_ignored = service.stored_points().ignored;
   snapshot.points_per_s = service.rates().points_per_s(now_ms);
   snapshot.thread_s_per_point = scheduler.thread_s_per_point();
   count_studies(service, now_ms, snapshot);

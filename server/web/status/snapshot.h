@@ -26,10 +26,11 @@ class Service;
 /// The state of the server at one moment, made by the event loop for the HTTP thread. Numbers of
 /// points count running and paused studies unless stated otherwise.
 struct Snapshot {
-  std::int64_t made_ms = 0;         ///< time on the steady clock
-  std::uint64_t points_solved = 0;  ///< solved points stored since the server started
-  std::uint64_t points_failed = 0;  ///< failed points stored since the server started
-  std::uint64_t points_open = 0;    ///< number of open points in running studies
+  std::int64_t made_ms = 0;           ///< time on the steady clock
+  std::uint64_t points_solved = 0;    ///< solved points stored since the server started
+  std::uint64_t points_failed = 0;    ///< failed points stored since the server started
+  std::uint64_t results_ignored = 0;  ///< StoredPoints::ignored
+  std::uint64_t points_open = 0;      ///< number of open points in running studies
   std::uint64_t points_leased = 0;
   double points_per_s = 0.0;
   double thread_s_per_point = 0.0;  ///< average of the last batches; 0 if unknown

@@ -179,6 +179,7 @@ class LoadGenerator::Parts {
       }
     }
     worker::Progress progress{job.batch.number(), job.batch.study_id(), {}, 0.0, solved == left};
+    progress.study_uid = job.batch.study_uid();
     progress.results.assign(solved, result_);
     for (std::uint64_t i = 0; i < solved; ++i) {
       progress.results[i].set_point(job.batch.point_at(job.done + i));

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -14,6 +15,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/result_message.h"
+#include "server/maintenance/backup.h"
 #include "server/query/reader.h"
 #include "tests/server/event_loop/running_server.h"
 #include "tests/server/network/raw_peer.h"
@@ -44,6 +46,27 @@ TEST_F(EventLoopTest, AStudyIsSolvedStoredAndQueried) {
   const auto known = client.reply_to(workers).workers();
   ASSERT_EQ(known.workers_size(), 1);
   EXPECT_EQ(known.workers(0).solved_points(), 30U);
+}
+
+TEST_F(EventLoopTest, EveryRequestForAnUnknownStudyGetsTheSameErrorCode) {
+  RunningServer server(path_);
+  SimulatedClient client(server.client_endpoint());
+  client.submit("a", 1);
+  std::vector<ClientRequest> requests(5);
+  requests[0].mutable_query()->mutable_question()->set_study("b");
+  requests[1].mutable_status()->set_study("b");
+  requests[2].mutable_describe()->set_study("b");
+  requests[3].mutable_trace()->set_study("b");
+  requests[4].mutable_change()->set_study("b");
+  for (const ClientRequest& request : requests) {
+    EXPECT_EQ(client.reply_to(request).error().code(), protocol::ERROR_CODE_NO_SUCH_STUDY)
+        << request.DebugString();
+  }
+  ClientRequest wrong;
+  wrong.mutable_query()->mutable_question()->set_study("a");
+  wrong.mutable_query()->mutable_question()->set_where("nothing > 1");
+  EXPECT_EQ(client.reply_to(wrong).error().code(), protocol::ERROR_CODE_WRONG_REQUEST);
+  EXPECT_EQ(client.query("SELEC 1").error().code(), protocol::ERROR_CODE_WRONG_REQUEST);
 }
 
 TEST_F(EventLoopTest, ResultsOfAnotherStudyAreReused) {
@@ -82,6 +105,62 @@ TEST_F(EventLoopTest, ARestartedServerContinuesItsStudies) {
   EXPECT_EQ(worker.hello().welcome().worker_id(), 2U);
   worker.work(30 - status.solved());
   EXPECT_EQ(client.status("a").state(), "done");
+}
+
+TEST_F(EventLoopTest, LateResultsAreNotStoredForAStudyThatGotTheirNumberAfterACopyWasRestored) {
+  const std::string copy = folder_.file("copy.db");
+  protocol::Recipe soft = table_of(30)->recipe();
+  protocol::Recipe stiff = soft;
+  stiff.mutable_model()->set_k_n_m(2 * soft.model().k_n_m());
+  protocol::Recipe deeper = soft;
+  for (double& H_m : *deeper.mutable_blocks(0)->mutable_axes(0)->mutable_values()) {
+    H_m *= 1.01;
+  }
+  for (const protocol::Recipe& later : {stiff, deeper}) {
+    for (const bool is_copied_by_hand : {false, true}) {
+      SCOPED_TRACE(is_copied_by_hand);
+      for (const auto& file : {path_, copy}) {
+        std::filesystem::remove(file);
+      }
+      {
+        RunningServer server(path_);
+        SimulatedClient(server.client_endpoint()).submit("before", 5);
+      }
+      if (is_copied_by_hand) {
+        std::filesystem::copy_file(path_, copy);
+      } else {
+        back_up(path_, copy);
+      }
+      WorkerMessage late;
+      std::string database_id;
+      {
+        RunningServer server(path_);
+        SimulatedClient client(server.client_endpoint());
+        SimulatedWorker worker(server.worker_endpoint());
+        database_id = worker.hello().welcome().database_id();
+        worker.work(5);
+        ASSERT_EQ(client.submit("soft", soft).submit().study_id(), 2U);
+        ServerToWorker message;
+        while (message.batch().study_id() != 2) {
+          message = worker.receive();
+        }
+        late = worker.results_of(message.batch());
+        late.mutable_results()->set_lease_id(0);
+      }
+      std::filesystem::rename(copy, path_);
+
+      RunningServer server(path_);
+      SimulatedClient client(server.client_endpoint());
+      ASSERT_EQ(client.submit("later", later).submit().study_id(), 2U);
+      SimulatedWorker worker(server.worker_endpoint());
+      EXPECT_EQ(worker.hello().welcome().database_id() == database_id, is_copied_by_hand);
+      worker.send(late);
+      EXPECT_EQ(worker.receive().results_stored().sequence(), late.results().sequence());
+      const protocol::StudyStatus status = client.status("later");
+      EXPECT_EQ(status.solved(), 0U);
+      EXPECT_EQ(status.failed(), 0U);
+    }
+  }
 }
 
 TEST_F(EventLoopTest, AStoppingServerNotifiesWorkersAndCommitsReceivedResults) {

@@ -149,6 +149,7 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
   ServerToWorker receive() {
     ServerToWorker message = Peer::receive();
     if (message.has_study()) {
+      uids_[message.study().study_id()] = message.study().uid();
       studies_[message.study().study_id()] =
           std::make_unique<protocol::PointTable>(message.study().recipe());
     }
@@ -161,20 +162,24 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
   }
   /// Makes `solve` report these points as failed.
   void fail(std::set<std::uint64_t> points) { failing_ = std::move(points); }
-  /// Sends a result for each point of the batch, or reports the point as left out. Returns the
-  /// number of left-out points.
+  /// Sends `results_of(batch)`. Returns the number of points.
   std::uint64_t solve(const protocol::Batch& batch) {
+    send(results_of(batch));
+    return points_of(batch).size();
+  }
+  /// Returns a message with a result for each point of the batch, or with the point as left out.
+  WorkerMessage results_of(const protocol::Batch& batch) {
     WorkerMessage message;
     auto& results = *message.mutable_results();
     results.set_study_id(batch.study_id());
+    results.set_study_uid(uids_.at(batch.study_id()));
     results.set_lease_id(batch.lease_id());
     results.set_attempt(batch.attempt());
     results.set_sequence(++sequence_);
     results.set_batch_done(true);
     results.set_busy_s(1e-3);
     const protocol::PointTable& table = *studies_.at(batch.study_id());
-    const auto points = points_of(batch);
-    for (const std::uint64_t point : points) {
+    for (const std::uint64_t point : points_of(batch)) {
       if (failing_.contains(point)) {
         *results.add_results() =
             protocol::failed_point(point, "failed as " + std::to_string(point));
@@ -185,8 +190,7 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
         results.add_left_out(1);
       }
     }
-    send(message);
-    return points.size();
+    return message;
   }
   /// Solves batches, one at a time, until `points` points are acknowledged as stored.
   void work(std::uint64_t points) {
@@ -208,6 +212,7 @@ class SimulatedWorker : public Peer<WorkerMessage, ServerToWorker> {
   std::uint64_t sequence_ = 0;
   std::map<std::uint64_t, std::uint64_t> in_hand_;
   std::set<std::uint64_t> failing_;
+  std::map<std::uint64_t, std::string> uids_;  // by study, as in the latest definitions
   // the latest definitions
   std::map<std::uint64_t, std::unique_ptr<protocol::PointTable>> studies_;
 };
@@ -225,9 +230,12 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
     return reply;
   }
   ClientReply submit(const std::string& name, std::uint64_t points) {
+    return submit(name, table_of(points)->recipe());
+  }
+  ClientReply submit(const std::string& name, const protocol::Recipe& recipe) {
     ClientRequest request;
     request.mutable_submit()->set_name(name);
-    *request.mutable_submit()->mutable_recipe() = table_of(points)->recipe();
+    *request.mutable_submit()->mutable_recipe() = recipe;
     return reply_to(request);
   }
   static ClientRequest query_request(const std::string& sql) {
@@ -252,7 +260,8 @@ class SimulatedClient : public Peer<ClientRequest, ClientReply> {
     constexpr int kMaxMessages = 600;  // one per second
     for (int words = 0; words < kMaxMessages; ++words) {
       const auto word = receive();
-      ASSERT_EQ(word.still_working().request_id(), id_);
+      ASSERT_TRUE(word.has_still_working());
+      ASSERT_EQ(word.request_id(), id_);
       if (word.still_working().runs()) {
         return;
       }

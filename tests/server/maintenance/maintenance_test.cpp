@@ -56,7 +56,11 @@ class MaintenanceTest : public StoreFixture {
   }
 
   std::string copy_ = folder_.file("copy.db");
-  const AddStudy study_ = study_of(10);
+  const AddStudy study_ = [] {
+    AddStudy study = study_of(10);
+    study.uid = "abc";
+    return study;
+  }();
 };
 
 TEST_F(MaintenanceTest, ACopyOfAnOpenDatabaseHasAllCommittedRows) {
@@ -66,7 +70,8 @@ TEST_F(MaintenanceTest, ACopyOfAnOpenDatabaseHasAllCommittedRows) {
   const auto studies = copy.studies();
   ASSERT_EQ(studies.size(), 1U);
   EXPECT_EQ(studies[0].completed, IntervalSet(0, 5));
-  EXPECT_EQ(copy.database_id(), store().database_id());
+  EXPECT_NE(copy.database_id(), store().database_id());
+  EXPECT_EQ(studies[0].uid, study_.uid);
   EXPECT_EQ(std::filesystem::status(copy_).permissions(),
             std::filesystem::perms::owner_read | std::filesystem::perms::owner_write)
       << "only the owner may read and write a copy";

@@ -107,7 +107,7 @@ class ServiceTest : public testing::Test {
   void request(const ClientRequest& message,
                const std::shared_ptr<const KeyIdentity>& holder = nullptr) {
     service_->client_frame("client", protocol::encode(message), now_, holder);
-    service_->scheduler().check_invariants();
+    check_invariants();
   }
   /// Sends a message on the connection `identity`.
   void send(const ClientRequest& message, const std::string& identity,
@@ -130,7 +130,12 @@ class ServiceTest : public testing::Test {
   }
   /// Submits a study and completes its write.
   void submit(const std::string& name, std::uint64_t points = 10) {
-    request(submit_request(name, points));
+    submit(name, table_of(points)->recipe());
+  }
+  void submit(const std::string& name, const protocol::Recipe& recipe) {
+    ClientRequest message = submit_request(name);
+    *message.mutable_submit()->mutable_recipe() = recipe;
+    request(message);
     write_all();
   }
   ClientRequest change_request(const std::string& name, protocol::StudyChange change) {
@@ -154,6 +159,7 @@ class ServiceTest : public testing::Test {
     WorkerMessage message;
     auto& results = *message.mutable_results();
     results.set_study_id(batch.study_id());
+    results.set_study_uid(uid_of(batch.study_id()));
     results.set_lease_id(batch.lease_id());
     results.set_attempt(batch.attempt());
     results.set_sequence(++sequence_);
@@ -170,6 +176,9 @@ class ServiceTest : public testing::Test {
     worker_sends(message, identity);
     write_all();
   }
+  std::string uid_of(StudyId study) const {
+    return service_->states().contains(study) ? service_->states().record(study).uid : "";
+  }
   /// Returns a worker's result for a point.
   protocol::PointResult solved(std::uint64_t point, StudyId study = 1) const {
     return solved_point(point, *service_->states().record(study).table.get());
@@ -180,6 +189,7 @@ class ServiceTest : public testing::Test {
     WorkerMessage message;
     auto& results = *message.mutable_results();
     results.set_study_id(study);
+    results.set_study_uid(uid_of(study));
     results.set_lease_id(lease);
     results.set_sequence(++sequence_);
     for (const std::uint64_t point : points) {
@@ -189,7 +199,7 @@ class ServiceTest : public testing::Test {
   }
   void worker_sends(const WorkerMessage& message, const std::string& identity = "worker") {
     service_->worker_frame(identity, protocol::encode(message), now_);
-    service_->scheduler().check_invariants();
+    check_invariants();
   }
   /// Lets a worker join and request a batch.
   void hello_and_credit() {
@@ -236,7 +246,15 @@ class ServiceTest : public testing::Test {
           {refused ? WriteReport::Kind::kRefused : WriteReport::Kind::kStored, job.ticket, error},
           now_);
     }
+    check_invariants();
+  }
+  void check_invariants() const {
     service_->scheduler().check_invariants();
+    std::uint64_t open = 0;
+    for (const StudyId id : service_->states().unfinished()) {
+      open += service_->states().record(id).table.size();
+    }
+    EXPECT_EQ(service_->states().open_points(), open);
   }
   /// Ends the `index`-th query with the given reply.
   void answer_query(std::size_t index, const std::string& reply) {
@@ -247,7 +265,7 @@ class ServiceTest : public testing::Test {
     for (const Ports::Check& check : std::exchange(ports_.checks, {})) {
       check()(now_);
     }
-    service_->scheduler().check_invariants();
+    check_invariants();
   }
   /// Advances the clock in steps of 100 ms, with a tick of the service after each.
   void pass(std::int64_t duration_ms) {

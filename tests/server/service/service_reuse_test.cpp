@@ -145,6 +145,21 @@ TEST_F(ServiceReuseTest, ALookupIsCutShortAfterAMillionProbesOrALongTimeWithoutA
   }
 }
 
+TEST_F(ServiceReuseTest, ALookupThatKeepsFindingResultsEndsAfterHalfAMinute) {
+  submit_study();
+  std::uint64_t parts_written = 0;
+  while (ended() == 0) {
+    ASSERT_LT(parts_written, 100U);
+    now_.steady_ms += 1000;
+    ++parts_written;
+    write_part(copies_of_a(IntervalSet(parts_written - 1, parts_written), parts_written));
+  }
+  EXPECT_EQ(parts_written, StudyChanges::kLongestLookup_ms / 1000);
+  write_all();
+  EXPECT_TRUE(status_of("b").reused().cut_short());
+  EXPECT_EQ(status_of("b").waits_for(), "") << "the other points are leased";
+}
+
 TEST_F(ServiceReuseTest, AFailedLookupIsCutShortAndTheStudyRuns) {
   submit_study();
   write_all("a page is damaged");
@@ -289,6 +304,7 @@ TEST_F(FilteredStudyTest, InvalidRangesEndTheConnection) {
     WorkerMessage message;
     auto& results = *message.mutable_results();
     results.set_study_id(1);
+    results.set_study_uid(uid_of(1));
     results.set_lease_id(last_message().batch().lease_id());
     results.set_batch_done(true);
     results.mutable_left_out()->Assign(numbers.begin(), numbers.end());

@@ -68,6 +68,7 @@ TEST_F(ServiceTest, AStudyThatCouldNotBeStoredIsRefusedAndItsNameIsFree) {
   request(submit_request("a"));
   write_all("the disk is full");
   EXPECT_THAT(last_error(), HasSubstr("the disk is full"));
+  EXPECT_EQ(last_reply().error().code(), protocol::ERROR_CODE_FAILED);
   submit("a", 20);
   EXPECT_EQ(last_reply().submit().points(), 20U);
 }
@@ -77,6 +78,7 @@ TEST_F(ServiceTest, InvalidStudiesAreRefusedWithTheReason) {
     ClientRequest message = submit_request("a");
     make_invalid(*message.mutable_submit());
     request(message);
+    EXPECT_EQ(last_reply().error().code(), protocol::ERROR_CODE_WRONG_REQUEST);
     return last_error();
   };
   EXPECT_THAT(error_of([](auto& study) { study.set_name(""); }), HasSubstr("1 to 100 bytes"));
@@ -132,8 +134,8 @@ TEST_F(ServiceTest, ResultsAreAcknowledgedWhenTheyAreStored) {
 
 TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFailedPoint) {
   submit("a", 3);
-  hello();
-  WorkerMessage message = results_of({0, 1, 2});
+  hello_and_credit();
+  WorkerMessage message = results_of({0, 1, 2}, 1, last_message().batch().lease_id());
   auto& results = *message.mutable_results()->mutable_results();
   results.at(0).set_h_m(std::nextafter(results.at(0).h_m(), 2.0));
   results.at(1).set_h_m(1.001 * results.at(1).h_m());
@@ -146,6 +148,52 @@ TEST_F(ServiceTest, AResultThatIsNotFiniteOrOfOtherInputsThanItsPointBecomesAFai
   EXPECT_THAT(change.results.at(2).error(), HasSubstr("duration_s"));
   write_all();
   EXPECT_EQ(service_->scheduler().study(1).failed, 2U);
+}
+
+TEST_F(ServiceTest, ResultsForAnotherStudyOfTheSameNumberAreAcknowledgedCountedAndNotStored) {
+  const protocol::Recipe one_model = table_of(4)->recipe();
+  protocol::Recipe models = one_model;
+  protocol::Axis& k = *models.mutable_blocks(0)->add_axes();
+  k = protocol::listed("k", {2e7, 3e7});
+  for (int i = models.blocks(0).axes_size() - 1; i > 0; --i) {  // model keys come first
+    models.mutable_blocks(0)->mutable_axes()->SwapElements(i, i - 1);
+  }
+  submit("a", one_model);
+  submit("b", models);
+  hello_and_credit();
+  const std::uint64_t lease = last_message().batch().lease_id();
+  const auto expect_ignored = [&](WorkerMessage message, std::uint64_t ignored) {
+    const std::uint64_t before = service_->stored_points().ignored;
+    worker_sends(message);
+    ASSERT_EQ(ports_.jobs.size(), 1U);
+    EXPECT_TRUE(std::get<AddResults>(ports_.jobs[0].change).results.empty());
+    write_all();
+    EXPECT_EQ(last_message().results_stored().sequence(), message.results().sequence());
+    EXPECT_EQ(service_->stored_points().ignored - before, ignored);
+  };
+  for (const std::uint64_t held : {std::uint64_t{0}, lease}) {
+    WorkerMessage other_uid = results_of({0, 1}, 1, held);
+    other_uid.mutable_results()->set_study_uid("other");
+    expect_ignored(other_uid, 2);
+  }
+  WorkerMessage other_H = results_of({1});
+  other_H.mutable_results()->mutable_results(0)->set_h_m(1.001);
+  expect_ignored(other_H, 1);
+  WorkerMessage other_k = results_of({1}, 2);
+  other_k.mutable_results()->mutable_results(0)->mutable_model()->set_k_n_m(4e7);
+  expect_ignored(other_k, 1);
+  for (const StudyId study : {1U, 2U}) {
+    EXPECT_EQ(service_->scheduler().study(study).completed, 0U);
+    EXPECT_EQ(service_->scheduler().study(study).failed, 0U);
+  }
+  WorkerMessage mixed = results_of({0, 1, 2});
+  mixed.mutable_results()->mutable_results(0)->set_mu(0.77);
+  worker_sends(mixed);
+  const auto& stored = std::get<AddResults>(ports_.jobs.back().change).results;
+  ASSERT_EQ(stored.size(), 2U);
+  EXPECT_EQ(stored.at(0).point(), 1U);
+  EXPECT_EQ(stored.at(1).point(), 2U);
+  EXPECT_THAT(ports_.lines, testing::Contains(HasSubstr("1 results for another study than a")));
 }
 
 TEST_F(ServiceTest, InvalidFramesAreCountedAndClientsGetAnError) {

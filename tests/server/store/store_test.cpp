@@ -30,6 +30,7 @@ using StoreTest = StoreFixture;
 TEST_F(StoreTest, CommittedRowsSurviveReopening) {
   auto study = study_of(10);
   study.submitted_by = "alice";
+  study.uid = "abc";
   commit({study, worker(1), solved(study, {0, 1, 5}), failed(study, {7})});
   const std::string identity = store().database_id();
   close();
@@ -46,6 +47,7 @@ TEST_F(StoreTest, CommittedRowsSurviveReopening) {
   EXPECT_EQ(studies[0].state, StudyState::kRunning);
   EXPECT_EQ(studies[0].solver_version, "0.1");
   EXPECT_EQ(studies[0].submitted_by, "alice");
+  EXPECT_EQ(studies[0].uid, "abc");
   EXPECT_EQ(store().last_study_id(), 1U);
   EXPECT_EQ(store().last_worker_id(), 1U);
   EXPECT_EQ(store().database_id(), identity);
