@@ -7,9 +7,7 @@
 #include "client/commands/shared.h"
 #include "client/service/connection.h"
 #include "client/service/source.h"
-#include "client/service/watching.h"
 #include "proto/program/usage.h"
-#include "worker/solver/model/errors.h"
 
 namespace oblique::client {
 namespace {
@@ -55,23 +53,16 @@ int query(const QueryFlags& flags, Console& console) {
   (void)format_of(flags.output);
   check(flags.query);
   const auto source = open_source(console, flags.source);
-  try {
-    const auto answer = source->rows(request_for(flags.query));
-    const auto rows = print_stream(console, *answer, flags.output, true,
-                                   "choose columns with --select; csv and json have all");
-    if (rows == 0 && flags.query.where.find("mode") != std::string::npos) {
-      console.note(fmt::format(
-          "Note: no point of {0} meets the condition. A mode lists the states in order, such as "
-          "'SC SR sR sC sR'; `oblique query {0} --group major_mode` lists the modes of the study.",
-          flags.query.study));
-    }
-    return kDone;
-  } catch (const solver::InputError&) {
-    // Throws std::runtime_error (exit code 1) if the study is unknown. Otherwise rethrows the error
-    // of the query (exit code 2).
-    (void)study_named(*source, flags.query.study);
-    throw;
+  const auto answer = source->rows(request_for(flags.query));
+  const auto rows = print_stream(console, *answer, flags.output, true,
+                                 "choose columns with --select; csv and json have all");
+  if (rows == 0 && flags.query.where.find("mode") != std::string::npos) {
+    console.note(fmt::format(
+        "Note: no point of {0} meets the condition. A mode lists the states in order, such as "
+        "'SC SR sR sC sR'; `oblique query {0} --group major_mode` lists the modes of the study.",
+        flags.query.study));
   }
+  return kDone;
 }
 
 int sql(const SqlFlags& flags, Console& console) {

@@ -70,10 +70,7 @@ FallAxes fall_axes(const protocol::Recipe& recipe) {
   FallAxes found;
   const ModelParameters model = protocol::from_message(recipe.model());
   for (const auto& block : recipe.blocks()) {
-    for (const auto* axis : protocol::model_axes(block)) {
-      if (!solver::changes_fall(protocol::axis_key(axis->key()), model)) {
-        continue;
-      }
+    for (const auto* axis : protocol::fall_axes(model, block)) {
       if (axis->has_distribution()) {
         found.drawn.insert(axis->key());
       } else {

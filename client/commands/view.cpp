@@ -6,8 +6,6 @@
 #include <ostream>
 #include <stdexcept>
 #include <string>
-#include <string_view>
-#include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -50,11 +48,12 @@ void wait_for_the_end(Console& console, EmbeddedService& service, protocol::Stop
   }
 }
 
-/// Whether the server ended because the port is in use. The caller then replaces the server's
-/// message, which names a flag of the server.
-bool is_taken(int port, const ProcessError& error) {
-  const auto taken = std::generic_category().message(EADDRINUSE);
-  return port != 0 && std::string_view(error.what()).find(taken) != std::string_view::npos;
+/// Returns whether another program uses the port.
+bool is_taken(int port) {
+  zmq::context_t context;
+  zmq::socket_t probe(context, zmq::socket_type::rep);
+  return zmq_bind(probe.handle(), fmt::format("tcp://127.0.0.1:{}", port).c_str()) != 0 &&
+         errno == EADDRINUSE;
 }
 
 int view(const ViewFlags& flags, Console& console) {
@@ -89,8 +88,8 @@ int view(const ViewFlags& flags, Console& console) {
     service.stop();
   } catch (const Interrupted&) {
     return stop.exit_code();
-  } catch (const ProcessError& error) {
-    if (is_taken(flags.port, error)) {
+  } catch (const ProcessError&) {
+    if (flags.port != 0 && is_taken(flags.port)) {
       throw std::runtime_error(fmt::format(
           "port {} is in use: name another with --port, or omit it to let the system choose",
           flags.port));

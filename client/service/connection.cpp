@@ -10,7 +10,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/address.h"
 #include "proto/frames.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
@@ -139,9 +138,7 @@ std::optional<protocol::ClientReply> Connection::received(std::uint64_t request_
         settings_.server_url));
   }
   // Ignores a late or repeated answer to an earlier request.
-  const bool is_word_of_it =
-      reply.has_still_working() && reply.still_working().request_id() == request_id;
-  if (reply.request_id() != request_id && reply.request_id() != 0 && !is_word_of_it) {
+  if (reply.request_id() != request_id && reply.request_id() != 0) {
     return std::nullopt;
   }
   return reply;
@@ -191,12 +188,11 @@ void Connection::throw_no_answer(const Outstanding& outstanding) const {
   }
   std::string guess = settings_.if_silent;
   if (guess.empty()) {
-    const std::string host = protocol::host_of(settings_.server_url);
-    const auto [has_v4, has_v6] = protocol::families_of(host);
-    guess = fmt::format("{}, or name it with --server URL or OBLIQUE_SERVER",
-                        host.empty() || has_v4 || has_v6
-                            ? "is a server running there? Start one with `oblique-server`"
-                            : fmt::format("the name {} has no address. Check it", host));
+    const std::string unknown = address_.error();
+    guess =
+        fmt::format("{}, or name it with --server URL or OBLIQUE_SERVER",
+                    unknown.empty() ? "is a server running there? Start one with `oblique-server`"
+                                    : unknown + ". Check it");
   }
   throw ConnectionError(
       fmt::format("no answer from {} within {}: {}", settings_.server_url, timeout, guess));
@@ -208,7 +204,7 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
   request.set_request_id(++last_request_id_);
   auto frame = protocol::encode(request);
   if (frame.size() > protocol::kMaxFrameBytes) {
-    throw ConnectionError(fmt::format(
+    throw solver::InputError(fmt::format(
         "the request has {} bytes; a server takes at most {}: write long lists of values as ranges",
         frame.size(), protocol::kMaxFrameBytes));
   }
@@ -221,7 +217,7 @@ protocol::ClientReply Connection::call(protocol::ClientRequest request, const Te
 }
 
 void Connection::check(const protocol::ClientReply& reply, int kind) const {
-  if (reply.has_error() && reply.error().wrong_request()) {
+  if (reply.has_error() && reply.error().code() == protocol::ERROR_CODE_WRONG_REQUEST) {
     throw solver::InputError(reply.error().message());
   }
   if (reply.has_error()) {

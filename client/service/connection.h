@@ -16,6 +16,7 @@
 #include "client/io/console.h"
 #include "client/service/source.h"
 #include "client/study/study.h"
+#include "proto/address.h"
 #include "proto/keys/key_file.h"
 #include "proto/oblique.pb.h"
 #include "proto/socket/socket.h"
@@ -156,6 +157,7 @@ class Connection : public Source {
 
   ConnectionSettings settings_;
   KeepWaiting keep_waiting_;
+  protocol::AddressLookup address_{settings_.server_url};
   zmq::context_t context_;
   zmq::socket_t socket_;
   protocol::SocketMonitor monitor_;

@@ -151,7 +151,7 @@ void check_size(const Recipe& recipe) {
 }
 
 bool parse_recipe(std::string_view bytes, Recipe& recipe) {
-  return bytes.size() <= kLongestRecipe && is_unpadded_recipe(bytes) &&
+  return bytes.size() <= kLongestRecipe && is_recipe_within_limits(bytes) &&
          recipe.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 

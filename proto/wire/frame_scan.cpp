@@ -1,9 +1,9 @@
 #include "proto/wire/frame_scan.h"
 
-#include <array>
-#include <span>
+#include <algorithm>
 #include <vector>
 
+#include <google/protobuf/descriptor.h>
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/wire_format_lite.h>
 
@@ -21,77 +21,85 @@ CodedInputStream stream_of(std::string_view bytes) {
                           static_cast<int>(bytes.size()));
 }
 
-struct Found {
-  std::size_t fields = 0;
-  std::size_t bytes = 0;  ///< total size of the found texts, packed lists and messages
-  bool is_whole = true;   ///< true if every message on the path is complete
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+
+/// Memory of the fields of a parsed message [bytes]: of fields that have a limit of their own, and
+/// of all others. Each number is at least the size of the encoded fields.
+struct Memory {
+  std::size_t bulk = 0;
+  std::size_t rest = 0;
 };
 
-Found find(std::string_view message, std::span<const int> path) {
-  Found found;
+/// Returns the maximum memory that parsing `message` takes on a 64-bit processor, or more than any
+/// limit. `bulk` are the fields with a limit of their own.
+Memory measure(std::string_view message, const Descriptor& type,
+               const std::vector<const FieldDescriptor*>& bulk) {
+  constexpr std::size_t kMessageBytes = 320;           // of an empty message of any type
+  constexpr std::size_t kTextBytes = 64;               // of an empty text
+  constexpr std::size_t kEnough = 8 * kMaxFrameBytes;  // above all limits
+  static_assert(sizeof(PointResult) < kMessageBytes && sizeof(Axis) < kMessageBytes);
+  Memory memory;
   CodedInputStream in = stream_of(message);
-  while (const std::uint32_t tag = in.ReadTag()) {
+  bool is_complete = true;
+  while (is_complete && memory.bulk + memory.rest < kEnough) {
     const auto begin = static_cast<std::size_t>(in.CurrentPosition());
-    if (!WireFormatLite::SkipField(&in, tag)) {
-      break;
-    }
-    if (WireFormatLite::GetTagFieldNumber(tag) != path.front()) {
-      continue;
-    }
-    std::string_view bytes;
-    if (WireFormatLite::GetTagWireType(tag) == WireFormatLite::WIRETYPE_LENGTH_DELIMITED) {
-      bytes = message.substr(begin, static_cast<std::size_t>(in.CurrentPosition()) - begin);
+    const std::uint32_t tag = in.ReadTag();
+    const auto value = static_cast<std::size_t>(in.CurrentPosition());
+    is_complete = tag != 0 && WireFormatLite::SkipField(&in, tag);
+    // Protobuf parses an incomplete field as far as it goes.
+    const std::size_t bytes =
+        (is_complete ? static_cast<std::size_t>(in.CurrentPosition()) : message.size()) - begin;
+    const auto wire_type = WireFormatLite::GetTagWireType(tag);
+    const bool has_length = wire_type == WireFormatLite::WIRETYPE_LENGTH_DELIMITED;
+    const FieldDescriptor* field = type.FindFieldByNumber(WireFormatLite::GetTagFieldNumber(tag));
+    Memory added;
+    if (has_length && field != nullptr && field->message_type() != nullptr) {
+      std::string_view inner = message.substr(value, begin + bytes - value);
+      CodedInputStream head = stream_of(inner);
       std::uint32_t length = 0;
-      stream_of(bytes).ReadVarint32(&length);
-      bytes.remove_prefix(bytes.size() - length);
+      head.ReadVarint32(&length);
+      inner.remove_prefix(static_cast<std::size_t>(head.CurrentPosition()));
+      added = measure(inner, *field->message_type(), bulk);
+      added.rest += kMessageBytes;
+    } else if (has_length && (field == nullptr || !field->is_packable())) {
+      added.rest = kTextBytes + bytes;
+    } else {
+      // A byte may be a number of 8 bytes; two bytes may be an unknown field of 64.
+      const bool is_group = wire_type == WireFormatLite::WIRETYPE_START_GROUP;
+      const bool is_double =
+          field != nullptr && field->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE;
+      added.rest = bytes * (is_group ? 32 : is_double ? 1 : 8);
     }
-    const Found inner =
-        path.size() > 1 ? find(bytes, path.subspan(1)) : Found{1, bytes.size(), true};
-    found.fields += inner.fields;
-    found.bytes += inner.bytes;
-    found.is_whole = found.is_whole && inner.is_whole;
+    if (std::ranges::count(bulk, field) > 0) {
+      added = {added.bulk + added.rest, 0};
+    }
+    memory.bulk += added.bulk;
+    memory.rest += added.rest;
   }
-  found.is_whole = found.is_whole && in.ConsumedEntireMessage();
-  return found;
-}
-
-/// Returns whether the recipe at the path has enough bytes for the axes that its blocks need.
-bool has_room_for_axes(std::string_view message, std::vector<int> path) {
-  // The smallest axis consists of a key and a range from 0 to 0. A block has at least three axes.
-  constexpr std::size_t kLeastAxisBytes = 5;
-  constexpr std::size_t kLeastBlockBytes = 3 * (2 + kLeastAxisBytes);
-  path.push_back(Recipe::kBlocksFieldNumber);
-  const Found blocks = find(message, path);
-  path.push_back(Block::kAxesFieldNumber);
-  const Found axes = find(message, path);
-  return axes.is_whole && blocks.fields * kLeastBlockBytes <= blocks.bytes &&
-         axes.fields * kLeastAxisBytes <= axes.bytes;
+  return memory;
 }
 
 }  // namespace
 
 bool is_worker_frame_within_limits(std::string_view frame) {
-  if (frame.size() > kMaxFrameBytes) {
-    return false;
-  }
-  using Message = WorkerMessage;
-  const auto bytes_of = [frame](int field) {
-    return find(frame, std::array{static_cast<int>(Message::kTraceFieldNumber), field}).bytes;
-  };
-  const auto rows = bytes_of(Trace::kValuesFieldNumber) + bytes_of(Trace::kStatesFieldNumber);
-  const std::array results{static_cast<int>(Message::kResultsFieldNumber),
-                           static_cast<int>(Results::kResultsFieldNumber)};
-  return frame.size() - rows <= kMaxWorkerFrameBytes &&
-         find(frame, results).fields <= kMaxResultsAMessage;
+  const Descriptor& trace = *Trace::descriptor();
+  const Memory memory = measure(frame, *WorkerMessage::descriptor(),
+                                {trace.FindFieldByNumber(Trace::kValuesFieldNumber),
+                                 trace.FindFieldByNumber(Trace::kStatesFieldNumber)});
+  return frame.size() <= kMaxFrameBytes && frame.size() <= kMaxWorkerFrameBytes + memory.bulk &&
+         memory.rest <= kMaxParsedWorkerFrameBytes;
 }
 
-bool is_unpadded_recipe(std::string_view recipe) {
-  return has_room_for_axes(recipe, {});
+bool is_request_within_limits(std::string_view frame) {
+  const Descriptor& request = *ClientRequest::descriptor();
+  const Memory memory =
+      measure(frame, request, {request.FindFieldByNumber(ClientRequest::kSubmitFieldNumber)});
+  return memory.bulk <= kMaxParsedRecipeBytes && memory.rest <= kMaxParsedRequestBytes;
 }
 
-bool is_unpadded_request(std::string_view frame) {
-  return has_room_for_axes(frame,
-                           {ClientRequest::kSubmitFieldNumber, SubmitRequest::kRecipeFieldNumber});
+bool is_recipe_within_limits(std::string_view recipe) {
+  return measure(recipe, *Recipe::descriptor(), {}).rest <= kMaxParsedRecipeBytes;
 }
 
 std::uint64_t request_id_of(std::string_view frame) {

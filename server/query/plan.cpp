@@ -542,7 +542,7 @@ QueriedStudy find_study(sqlite3* database, const std::string& name) {
   Statement study(database, "SELECT study_id, points, recipe FROM studies WHERE name = ?1");
   study.bind(1, name);
   if (!study.step()) {
-    throw InputError(no_such_study(database, name));
+    throw NoSuchStudy(no_such_study(database, name));
   }
   QueriedStudy found{name, study.integer(0), study.number(1)};
   if (!protocol::parse_recipe(study.bytes(2), found.recipe)) {

@@ -27,7 +27,7 @@ struct Plan {
 
 /// Turns `question` into a statement. `database` must have passed restrict_to_reading. Throws
 /// solver::InputError for a wrong query; the message names the flag or column and what is allowed.
-/// Throws StorageError or QueryError if the database cannot be read.
+/// Throws NoSuchStudy, and StorageError or QueryError if the database cannot be read.
 Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
 /// Returns the error message for an unknown study, which suggests the nearest study name.

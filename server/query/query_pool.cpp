@@ -113,10 +113,10 @@ void check_call(bool done, const char* what) {
   }
 }
 
-std::string encoded_error(const std::string& message, bool wrong_request) {
+std::string encoded_error(const std::string& message, protocol::ErrorCode code) {
   constexpr std::size_t kLongestError = 4000;
   protocol::ClientReply reply;
-  reply.mutable_error()->set_wrong_request(wrong_request);
+  reply.mutable_error()->set_code(code);
   // SQLite's message may quote bytes of the statement that are not UTF-8.
   reply.mutable_error()->set_message(protocol::shortened(
       protocol::is_utf8(message) ? message : hexadecimal(message), kLongestError));
@@ -137,10 +137,14 @@ int run_reader_program(const std::string& path) {
       send_answer(path, request);
     } catch (const std::bad_alloc&) {
       send_frame(encoded_error("the query needs more memory than is allowed"), true);
+    } catch (const NoSuchStudy& error) {
+      send_frame(encoded_error(error.what(), protocol::ERROR_CODE_NO_SUCH_STUDY), true);
     } catch (const std::exception& error) {
       const bool is_wrong = dynamic_cast<const StatementError*>(&error) != nullptr ||
                             dynamic_cast<const solver::InputError*>(&error) != nullptr;
-      send_frame(encoded_error(error.what(), is_wrong), true);
+      send_frame(encoded_error(error.what(), is_wrong ? protocol::ERROR_CODE_WRONG_REQUEST
+                                                      : protocol::ERROR_CODE_FAILED),
+                 true);
     }
     return 0;
   } catch (const std::exception& error) {
@@ -153,9 +157,9 @@ int run_reader_program(const std::string& path) {
 
 bool QueryQueue::add(QueryJob job) {
   const auto of_client = std::ranges::count(waiting_, job.client, &QueryJob::client);
-  std::size_t bytes = job.request.ByteSizeLong();
+  std::size_t bytes = job.bytes = job.request.SpaceUsedLong();
   for (const QueryJob& other : waiting_) {
-    bytes += other.request.ByteSizeLong();
+    bytes += other.bytes;
   }
   if (waiting_.size() >= settings_.most_waiting || bytes > settings_.most_waiting_bytes ||
       static_cast<std::size_t>(of_client) >= settings_.most_waiting_each) {
@@ -374,7 +378,7 @@ void QueryPool::take_requests() {
     const auto query = std::ranges::find(running_, request.first, &Running::ticket);
     if (request.second == kCancelled) {
       forget(request.first);
-      running_.erase(query, query == running_.end() ? query : std::next(query));
+      std::erase_if(running_, [&](const Running& each) { return each.ticket == request.first; });
     } else if (query != running_.end() && request.second > query->received_chunks) {
       const bool waited = query->waits_for_client();
       query->received_chunks = request.second;

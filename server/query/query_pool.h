@@ -25,6 +25,7 @@ struct QueryJob {
   std::uint64_t ticket;  ///< unique
   std::string client;    ///< name of the client's key or, without keys, ID of its connection
   protocol::QueryRequest request;
+  std::size_t bytes = 0;  ///< memory of the request; QueryQueue sets it
 };
 
 struct QueueSettings {
@@ -34,7 +35,7 @@ struct QueueSettings {
   std::size_t most_waiting = limits::kWaitingQueries;  ///< maximum number of waiting queries
   /// maximum number of waiting queries per client
   std::size_t most_waiting_each = limits::kWaitingQueriesOfClient;
-  /// maximum total size of waiting statements [bytes]
+  /// maximum memory of waiting requests [bytes]
   std::size_t most_waiting_bytes = limits::kWaitingQueryBytes;
 };
 
@@ -146,7 +147,8 @@ struct FrameHead {
 /// Throws std::system_error with errno if `done` is false.
 void check_call(bool done, const char* what);
 
-std::string encoded_error(const std::string& message, bool wrong_request = false);
+std::string encoded_error(const std::string& message,
+                          protocol::ErrorCode code = protocol::ERROR_CODE_FAILED);
 
 /// Starts `program` as a reader process for the database at `path`. Its descriptor kReaderRequest
 /// becomes `request` and its standard output `answer`. No signal is blocked or ignored in it. It

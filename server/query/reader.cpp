@@ -335,7 +335,7 @@ std::vector<protocol::StudyStatus> Reader::study_status(const std::string& name)
     found.push_back(std::move(status));
   }
   if (found.empty() && !name.empty()) {
-    throw QueryError(no_such_study(database_.get(), name));
+    throw NoSuchStudy(no_such_study(database_.get(), name));
   }
   return found;
 }

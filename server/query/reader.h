@@ -29,6 +29,11 @@ class StatementError : public QueryError {
   using QueryError::QueryError;
 };
 
+class NoSuchStudy : public QueryError {
+ public:
+  using QueryError::QueryError;
+};
+
 /// Limits of one query.
 struct QueryLimits {
   /// maximum size of a row; below protocol::kMaxFrameBytes

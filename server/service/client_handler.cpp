@@ -30,8 +30,8 @@ void ClientHandler::frame(const std::string& identity, std::string_view frame, I
     check({identity, protocol::request_id_of(frame), holder}, frame, now);
     return;
   }
-  const ReadRequest read = read_request(frame, false);
-  answer({identity, read.request_id, holder}, read, frame, now);
+  ReadRequest read = read_request(frame, false);
+  answer({identity, read.request_id, holder}, std::move(read), frame, now);
 }
 
 void ClientHandler::check(const Client& client, std::string_view frame, Instant now) {
@@ -68,20 +68,22 @@ void ClientHandler::check(const Client& client, std::string_view frame, Instant 
     } catch (const std::exception&) {  // out of memory
       read.request_id = protocol::request_id_of(*locked);
     }
-    return [this, ticket, read = std::move(read)](Instant then) { checked(ticket, read, then); };
+    return [this, ticket, read = std::move(read)](Instant then) mutable {
+      checked(ticket, std::move(read), then);
+    };
   });
   Pending& pending = add(ticket, client, now);
   pending.frame = std::move(kept);
   pending.runs = true;
 }
 
-void ClientHandler::checked(std::uint64_t ticket, const ReadRequest& read, Instant now) {
+void ClientHandler::checked(std::uint64_t ticket, ReadRequest&& read, Instant now) {
   const auto request = pending_.extract(ticket);
   if (!request) {
     return;
   }
   const Client& waiting = request.mapped().client;
-  answer({waiting.identity, read.request_id, waiting.holder}, read, {}, now);
+  answer({waiting.identity, read.request_id, waiting.holder}, std::move(read), {}, now);
 }
 
 /// Returns why a request of any kind is refused, or an empty text.
@@ -90,7 +92,7 @@ std::string ClientHandler::request_error(const Client& client, const ReadRequest
   const WriteLedger& ledger = core_.ledger;
   if (!read.is_readable) {
     log_.bad_frame("a client");
-    return "the request is not a valid message";
+    return "the request is not a valid message, or needs too much memory";
   }
   if (request.protocol_version() == 0) {
     log_.bad_frame("a client");
@@ -130,16 +132,18 @@ std::string ClientHandler::request_error(const Client& client, const ReadRequest
   return {};
 }
 
-void ClientHandler::answer(const Client& client, const ReadRequest& read, std::string_view frame,
+void ClientHandler::answer(const Client& client, ReadRequest&& read, std::string_view frame,
                            Instant now) {
   if (const std::string reason = request_error(client, read); !reason.empty()) {
-    core_.ports.reply_error(client, reason);
+    core_.ports.reply_error(
+        client, reason,
+        read.is_readable ? protocol::ERROR_CODE_FAILED : protocol::ERROR_CODE_WRONG_REQUEST);
     return;
   }
   if (read.needs_point_validation) {
     return check(client, frame, now);
   }
-  const protocol::ClientRequest& request = read.request;
+  protocol::ClientRequest& request = read.request;
   using Kind = protocol::ClientRequest;
   switch (request.kind_case()) {
     case Kind::kSubmit:
@@ -151,7 +155,7 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, std::s
     case Kind::kChange:
       return changes_.change(client, request.change(), now);
     case Kind::kQuery:
-      return query(client, request.query(), now);
+      return query(client, std::move(*request.mutable_query()), now);
     case Kind::kDescribe:
       return describe(client, request.describe());
     case Kind::kTrace:
@@ -162,22 +166,22 @@ void ClientHandler::answer(const Client& client, const ReadRequest& read, std::s
       return end_query(client, request.end_query().request_id());
     case Kind::KIND_NOT_SET:
       log_.bad_frame("a client");
-      core_.ports.reply_error(client, "unknown kind of request");
+      core_.ports.reply_error(client, "unknown kind of request",
+                              protocol::ERROR_CODE_WRONG_REQUEST);
       break;
   }
 }
 
 // ---- Queries -----------------------------------------------------------------------------------
 
-void ClientHandler::query(const Client& client, const protocol::QueryRequest& request,
-                          Instant now) {
+void ClientHandler::query(const Client& client, protocol::QueryRequest request, Instant now) {
   if (find(client.identity, client.request_id) != pending_.end()) {
     return;  // the client repeats the request because the answer takes long
   }
   const std::uint64_t ticket = ++last_ticket_;
   if (stopping_) {
     core_.ports.reply_error(client, kStopping);
-  } else if (!core_.ports.query({ticket, client.share(), request})) {
+  } else if (!core_.ports.query({ticket, client.share(), std::move(request)})) {
     core_.ports.reply_error(client, "too many queries are waiting: try again later");
   } else {
     add(ticket, client, now);
@@ -286,7 +290,8 @@ std::optional<StudyId> ClientHandler::find_study(const Client& client, const std
                                                  StudyId id) {
   const auto known = core_.states.find_durable(name, id);
   if (!known) {
-    core_.ports.reply_error(client, unknown_study(name, core_.states));
+    core_.ports.reply_error(client, unknown_study(name, core_.states),
+                            protocol::ERROR_CODE_NO_SUCH_STUDY);
   }
   return known;
 }

@@ -83,11 +83,11 @@ class ClientHandler {
   using PendingRequests = std::map<std::uint64_t, Pending>;
 
   void check(const Client& client, std::string_view frame, Instant now);
-  void checked(std::uint64_t ticket, const ReadRequest& read, Instant now);
+  void checked(std::uint64_t ticket, ReadRequest&& read, Instant now);
   std::string request_error(const Client& client, const ReadRequest& read);
   /// Answers `read`, which was parsed from `frame`, or lets the check thread validate it first.
-  void answer(const Client& client, const ReadRequest& read, std::string_view frame, Instant now);
-  void query(const Client& client, const protocol::QueryRequest& request, Instant now);
+  void answer(const Client& client, ReadRequest&& read, std::string_view frame, Instant now);
+  void query(const Client& client, protocol::QueryRequest request, Instant now);
   void more_rows(const Client& client, const protocol::MoreRows& request);
   void end_query(const Client& client, std::uint64_t request_id);
   void status(const Client& client, const protocol::StatusRequest& request, Instant now);

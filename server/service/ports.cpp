@@ -23,21 +23,20 @@ bool Ports::reply(const Client& client, protocol::ClientReply reply) {
   return to_client(client.identity, protocol::encode(reply));
 }
 
-bool Ports::reply_error(const Client& client, const std::string& message) {
-  return reply(client, error_reply(message));
+bool Ports::reply_error(const Client& client, const std::string& message,
+                        protocol::ErrorCode code) {
+  return reply(client, error_reply(message, code));
 }
 
 bool Ports::reply_still_working(const Client& client, bool runs) {
-  // No request has this number, so clients that do not support StillWorking ignore the message.
-  constexpr std::uint64_t kNoRequest = UINT64_MAX;
   protocol::ClientReply message;
-  message.mutable_still_working()->set_request_id(client.request_id);
   message.mutable_still_working()->set_runs(runs);
-  return reply({client.identity, kNoRequest}, std::move(message));
+  return reply(client, std::move(message));
 }
 
-protocol::ClientReply error_reply(const std::string& message) {
+protocol::ClientReply error_reply(const std::string& message, protocol::ErrorCode code) {
   protocol::ClientReply reply;
+  reply.mutable_error()->set_code(code);
   reply.mutable_error()->set_message(message);
   return reply;
 }

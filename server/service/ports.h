@@ -79,12 +79,14 @@ class Ports {
   // ---- Functions that take messages.
   /// Sends `reply` with the number of the request.
   bool reply(const Client& client, protocol::ClientReply reply);
-  bool reply_error(const Client& client, const std::string& message);
+  bool reply_error(const Client& client, const std::string& message,
+                   protocol::ErrorCode code = protocol::ERROR_CODE_FAILED);
   /// Reports to the client that its request waits or runs. Returns false if the client is gone.
   bool reply_still_working(const Client& client, bool runs);
 };
 
-protocol::ClientReply error_reply(const std::string& message);
+protocol::ClientReply error_reply(const std::string& message,
+                                  protocol::ErrorCode code = protocol::ERROR_CODE_FAILED);
 
 /// Writes log lines that peers can cause at any rate: at most 20 lines in 10 s, then the number of
 /// suppressed lines.

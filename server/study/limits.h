@@ -75,7 +75,7 @@ inline constexpr std::size_t kRecipesOfPage = 4;
 
 /// Maximum number of running queries of one client, so that another client's query starts at once.
 inline constexpr std::size_t kRunningQueriesOfClient = 2;
-/// Maximum numbers of waiting queries, in all and per client, and their maximum size in all. One
+/// Maximum numbers of waiting queries, in all and per client, and their maximum memory in all. One
 /// query may have a megabyte.
 inline constexpr std::size_t kWaitingQueries = 64;
 inline constexpr std::size_t kWaitingQueriesOfClient = 16;

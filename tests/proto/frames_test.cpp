@@ -1,10 +1,14 @@
 #include "proto/frames.h"
 
 #include <string>
+#include <vector>
 
+#include <google/protobuf/empty.pb.h>
 #include <gtest/gtest.h>
 
 #include "proto/oblique.pb.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
 #include "proto/wire/frame_scan.h"
 #include "tests/support/recipes.h"
 
@@ -113,9 +117,95 @@ TEST(FrameScanTest, FramesOfCorrectWorkersPass) {
   EXPECT_TRUE(is_worker_frame_within_limits(encode(long_text)));
 }
 
-TEST(FrameScanTest, AMessageWithTooManyResultsIsRefused) {
-  EXPECT_TRUE(is_worker_frame_within_limits(results_of(kMaxResultsAMessage)));
-  EXPECT_FALSE(is_worker_frame_within_limits(results_of(kMaxResultsAMessage + 1)));
+/// Returns a field as it is encoded: a tag, and `value`.
+std::string encoded_field(int number, int wire_type, const std::string& value) {
+  std::string field;
+  for (auto tag = static_cast<unsigned>(number << 3 | wire_type); tag != 0; tag >>= 7U) {
+    field += static_cast<char>((tag & 0x7fU) | (tag >= 0x80U ? 0x80U : 0U));
+  }
+  return field + value;
+}
+
+/// Adds the path to each field of `type` and of its parts, and to one unknown field of each.
+void add_paths(const google::protobuf::Descriptor& type, const std::vector<int>& outer,
+               std::vector<std::vector<int>>& paths) {
+  constexpr int kUnknown = 15;
+  std::vector<int> numbers{kUnknown};
+  for (int i = 0; i < type.field_count(); ++i) {
+    numbers.push_back(type.field(i)->number());
+  }
+  for (const int number : numbers) {
+    std::vector<int> path = outer;
+    path.push_back(number);
+    paths.push_back(path);
+    const auto* field = type.FindFieldByNumber(number);
+    if (field != nullptr && field->message_type() != nullptr) {
+      add_paths(*field->message_type(), path, paths);
+    }
+  }
+}
+
+/// Expects that a frame with very many smallest values in any one field is either refused or needs
+/// at most `most_bytes(path)` when it is parsed.
+template <class Message, class IsWithinLimits, class MostBytes>
+void expect_bounded_memory(const IsWithinLimits& is_within_limits, const MostBytes& most_bytes) {
+  constexpr int kValues = 100'000;
+  std::vector<std::vector<int>> paths;
+  add_paths(*Message::descriptor(), {}, paths);
+  int refused = 0;
+  for (const std::vector<int>& path : paths) {
+    const int number = path.back();
+    for (const std::string& value : {encoded_field(number, 0, std::string(1, '\0')),
+                                     encoded_field(number, 2, std::string(1, '\0')),
+                                     encoded_field(number, 3, encoded_field(number, 4, ""))}) {
+      std::string frame;
+      for (int i = 0; i < kValues; ++i) {
+        frame += value;
+      }
+      for (std::size_t i = path.size() - 1; i-- > 0;) {
+        frame = encode_around(google::protobuf::Empty(), path[i], frame);
+      }
+      for (const bool is_cut : {false, true}) {
+        if (is_cut) {
+          frame.pop_back();
+        }
+        Message message;
+        if (is_within_limits(frame)) {
+          (void)decode(frame, message);
+        } else {
+          ++refused;
+        }
+        EXPECT_LE(message.SpaceUsedLong(), most_bytes(path)) << testing::PrintToString(path);
+      }
+    }
+  }
+  EXPECT_GT(refused, 0);
+}
+
+TEST(FrameScanTest, NoFieldOfARequestCanTakeMoreMemoryThanIsAllowed) {
+  expect_bounded_memory<ClientRequest>(is_request_within_limits, [](const std::vector<int>& path) {
+    return path.front() == ClientRequest::kSubmitFieldNumber ? kMaxParsedRecipeBytes
+                                                             : kMaxParsedRequestBytes;
+  });
+}
+
+TEST(FrameScanTest, NoFieldOfAWorkersMessageCanTakeMoreMemoryThanIsAllowed) {
+  expect_bounded_memory<WorkerMessage>(is_worker_frame_within_limits, [](const std::vector<int>&) {
+    return kMaxParsedWorkerFrameBytes;
+  });
+}
+
+TEST(FrameScanTest, ManyEmptyTextsInAQueryOrResultAreNotParsed) {
+  ClientRequest request;
+  WorkerMessage message;
+  PointResult& result = *message.mutable_results()->add_results();
+  for (int i = 0; i < 2'000'000; ++i) {
+    request.mutable_query()->mutable_question()->add_select("");
+    result.add_texts("");
+  }
+  EXPECT_FALSE(is_request_within_limits(encode(request)));
+  EXPECT_LT(encode(message).size(), kMaxWorkerFrameBytes + 1000);
+  EXPECT_FALSE(is_worker_frame_within_limits(encode(message)));
 }
 
 TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedUnlessItIsATrace) {
@@ -135,32 +225,39 @@ TEST(FrameScanTest, ALongFrameOfAWorkerIsRefusedUnlessItIsATrace) {
       << "only rows of a trace may make a frame so long";
 }
 
-TEST(FrameScanTest, ARecipeWithoutPaddingPasses) {
-  EXPECT_TRUE(is_unpadded_request(encode(submission())));
+TEST(FrameScanTest, TheLargestRequestsOfCorrectClientsPass) {
+  EXPECT_TRUE(is_request_within_limits(encode(submission())));
   ClientRequest query;
-  query.mutable_query()->set_sql("SELECT 1");
-  EXPECT_TRUE(is_unpadded_request(encode(query)));
+  query.mutable_query()->set_sql(std::string(1'000'000, 'x'));
+  EXPECT_TRUE(is_request_within_limits(encode(query)));
+  ClientRequest list = submission();
+  list.mutable_submit()
+      ->mutable_recipe()
+      ->mutable_blocks(0)
+      ->mutable_axes(0)
+      ->mutable_values()
+      ->Resize(2'000'000, 1.5);
+  EXPECT_TRUE(is_request_within_limits(encode(list)));
+  ClientRequest blocks = submission();
+  const Recipe recipe = blocks.submit().recipe();
+  for (std::size_t i = 1; i < kMaxBlocks; ++i) {
+    *blocks.mutable_submit()->mutable_recipe()->add_blocks() = recipe.blocks(0);
+  }
+  EXPECT_TRUE(is_request_within_limits(encode(blocks)));
 }
 
-TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotRead) {
+TEST(FrameScanTest, ARecipePaddedWithEmptyBlocksOrAxesIsNotParsed) {
   ClientRequest blocks = submission();
   ClientRequest axes = submission();
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 250'000; ++i) {
     blocks.mutable_submit()->mutable_recipe()->add_blocks();
     axes.mutable_submit()->mutable_recipe()->mutable_blocks(0)->add_axes();
   }
-  EXPECT_FALSE(is_unpadded_request(encode(blocks)));
-  EXPECT_FALSE(is_unpadded_request(encode(axes)));
-  EXPECT_FALSE(is_unpadded_request(std::string("\x1a\x7f", 2))) << "the frame is truncated";
-}
-
-TEST(FrameScanTest, ARecipeInAFileIsCheckedLikeOneInARequest) {
-  Recipe recipe = submission().submit().recipe();
-  EXPECT_TRUE(is_unpadded_recipe(recipe.SerializeAsString()));
-  for (int i = 0; i < 20; ++i) {
-    recipe.add_blocks();
+  for (const ClientRequest& padded : {blocks, axes}) {
+    EXPECT_FALSE(is_request_within_limits(encode(padded)));
+    Recipe recipe;
+    EXPECT_FALSE(parse_recipe(padded.submit().recipe().SerializeAsString(), recipe));
   }
-  EXPECT_FALSE(is_unpadded_recipe(recipe.SerializeAsString()));
 }
 
 TEST(FrameScanTest, TheNumberOfARequestIsReadFromItsBeginning) {
@@ -176,7 +273,7 @@ TEST(FrameScanTest, TruncatedAndForeignFramesAreNotReadBeyondTheirEnd) {
   for (std::size_t length = 0; length <= frame.size(); ++length) {
     for (const char foreign : {'\x00', '\x0f', '\x7f', '\xff'}) {
       const std::string cut = frame.substr(0, length) + foreign;
-      (void)is_unpadded_request(cut);
+      (void)is_request_within_limits(cut);
       (void)is_worker_frame_within_limits(cut);
       EXPECT_TRUE(request_id_of(cut) == 77U || length < 5) << length;
     }

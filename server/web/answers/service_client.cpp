@@ -53,8 +53,8 @@ void ServiceClient::decode_frames() {
       continue;
     }
     const auto awaited = awaited_.find(reply.request_id());
-    if (awaited == awaited_.end()) {
-      continue;  // not needed: a reply to a dropped request, or a StillWorking
+    if (awaited == awaited_.end() || reply.has_still_working()) {
+      continue;  // not needed; the first is a reply to a dropped request
     }
     const bool is_part = reply.has_query() && !reply.query().ends();
     awaited->second.may_end = awaited->second.may_end && is_part;
@@ -99,11 +99,12 @@ void ServiceClient::put(std::string frame) {
 }
 
 HttpAnswer failure(const protocol::ErrorReply& error) {
-  if (error.message().starts_with("there is no study")) {
+  if (error.code() == protocol::ERROR_CODE_NO_SUCH_STUDY) {
     return error_answer(MHD_HTTP_NOT_FOUND, "there is no such study");
   }
-  return error_answer(error.wrong_request() ? MHD_HTTP_BAD_REQUEST : MHD_HTTP_CONFLICT,
-                      error.message());
+  return error_answer(
+      error.code() == protocol::ERROR_CODE_WRONG_REQUEST ? MHD_HTTP_BAD_REQUEST : MHD_HTTP_CONFLICT,
+      error.message());
 }
 
 }  // namespace oblique::server

@@ -269,7 +269,7 @@ class Flow {
   std::optional<HttpAnswer> on_error(const protocol::ErrorReply& error) {
     HttpAnswer answer = failure(error);
     if (answer.status == MHD_HTTP_NOT_FOUND || error_ || answer_->condition().empty() ||
-        !error.wrong_request() || !study_.table) {
+        error.code() != protocol::ERROR_CODE_WRONG_REQUEST || !study_.table) {
       return answer;
     }
     error_ = std::move(answer);

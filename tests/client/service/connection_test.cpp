@@ -84,6 +84,24 @@ TEST(Connection, ThrowsTheServersErrors) {
   }
 }
 
+TEST(Connection, TheCodeOfAnErrorTellsWrongUsageFromFailure) {
+  protocol::ErrorCode code{};
+  const ScriptedServer server([&code](const protocol::ClientRequest& request) {
+    auto reply = reply_to(request);
+    reply.mutable_error()->set_message("a sentence");
+    reply.mutable_error()->set_code(code);
+    return std::vector{protocol::encode(reply)};
+  });
+  Connection connection(at(server.url(), kLong_ms));
+  const auto call = [&](protocol::ErrorCode next) {
+    code = next;
+    connection.describe("x");
+  };
+  EXPECT_THROW(call(protocol::ERROR_CODE_FAILED), ServerError);
+  EXPECT_THROW(call(protocol::ERROR_CODE_NO_SUCH_STUDY), ServerError);
+  EXPECT_THROW(call(protocol::ERROR_CODE_WRONG_REQUEST), solver::InputError);
+}
+
 /// A reply to a status request that reports `workers` workers.
 std::vector<std::string> workers_reply(const protocol::ClientRequest& request,
                                        std::uint32_t workers) {
@@ -180,8 +198,7 @@ TEST(Connection, ReportsSilenceAndTheNextAnswer) {
 /// The message StillWorking, which a server sends while a query waits or runs.
 std::string still_working(const protocol::ClientRequest& request, bool runs) {
   protocol::ClientReply word;
-  word.set_request_id(UINT64_MAX);
-  word.mutable_still_working()->set_request_id(request.request_id());
+  word.set_request_id(request.request_id());
   word.mutable_still_working()->set_runs(runs);
   return protocol::encode(word);
 }

@@ -124,7 +124,9 @@ TEST_F(SourceTest, ReportsAWrongStatementAsWrongUsageForFilesAndServers) {
   const ScriptedServer server([](const protocol::ClientRequest& request) {
     auto reply = reply_to(request);
     reply.mutable_error()->set_message("the statement is wrong");
-    reply.mutable_error()->set_wrong_request(request.query().sql() == "SELEC 1");
+    reply.mutable_error()->set_code(request.query().sql() == "SELEC 1"
+                                        ? protocol::ERROR_CODE_WRONG_REQUEST
+                                        : protocol::ERROR_CODE_FAILED);
     return std::vector{protocol::encode(reply)};
   });
   const auto source = open({.database = {}, .server = server.url(), .timeout_s = {}});

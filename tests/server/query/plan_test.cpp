@@ -378,7 +378,8 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
   EXPECT_EQ(number("count(*)", "\"mu\" > 0.5"), number("count(*)", "mu > 0.5"));
   auto unknown = question("mu");
   unknown.set_study("b");
-  EXPECT_THAT(error(unknown), HasSubstr("no study called \"b\""));
+  EXPECT_THAT([&] { plan(database_.get(), unknown); },
+              testing::ThrowsMessage<NoSuchStudy>(HasSubstr("no study called \"b\"")));
 }
 
 TEST_F(PlanTest, NumbersInEveryClauseEqualTheTypedNumbers) {

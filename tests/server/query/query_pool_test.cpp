@@ -342,11 +342,23 @@ TEST_F(QueryQueueTest, TheNumberOfWaitingQueriesIsBoundedForEachClientAndForAll)
   EXPECT_TRUE(add("one more"));
 }
 
-TEST_F(QueryQueueTest, TheBytesOfWaitingStatementsAreBounded) {
-  const std::string half(QueueSettings{}.most_waiting_bytes / 2 - 100, ' ');
+TEST_F(QueryQueueTest, ManyEmptyTextsCountWithTheirMemory) {
+  QueryJob job{0, {}, {}};
+  for (int i = 0; i < 100'000; ++i) {
+    job.request.mutable_question()->add_select("");
+  }
+  int waiting = 0;
+  while (waiting < 64 && queue_.add({++last_ticket_, std::to_string(waiting), job.request})) {
+    ++waiting;
+  }
+  EXPECT_LE(waiting, 4);
+}
+
+TEST_F(QueryQueueTest, TheMemoryOfWaitingQueriesIsBounded) {
+  const std::string half(QueueSettings{}.most_waiting_bytes / 2 - 1000, ' ');
   ASSERT_TRUE(add("a", half));
   ASSERT_TRUE(add("b", half));
-  EXPECT_FALSE(add("c", std::string(1000, ' ')));
+  EXPECT_FALSE(add("c", std::string(4000, ' ')));
   queue_.remove(2);
   EXPECT_TRUE(add("c", half)) << "the removed query takes no room";
   EXPECT_FALSE(add("d", half));

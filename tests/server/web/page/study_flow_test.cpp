@@ -106,7 +106,7 @@ class StudyFlowTest : public testing::Test {
   static ClientReply error_of(const std::string& message) {
     ClientReply reply;
     reply.mutable_error()->set_message(message);
-    reply.mutable_error()->set_wrong_request(true);
+    reply.mutable_error()->set_code(protocol::ERROR_CODE_WRONG_REQUEST);
     return reply;
   }
   ServiceClient client_;
