@@ -249,6 +249,20 @@ solver::ModelParameters shortest_model(solver::ModelParameters model, const Bloc
   return model;
 }
 
+std::vector<const Axis*> fall_axes(solver::ModelParameters model, const Block& block) {
+  std::vector<const Axis*> found;
+  for (const Axis* axis : model_axes(block)) {  // the integrator comes before its parameter
+    const solver::ParameterKey& key = axis_key(axis->key());
+    if (key.name == "integrator" && has_own_values(*axis)) {
+      key.set(model, largest_value(*axis));
+    }
+    if (solver::changes_fall(key, model)) {
+      found.push_back(axis);
+    }
+  }
+  return found;
+}
+
 Block block_of(std::vector<Axis> axes) {
   std::stable_sort(axes.begin(), axes.end(), [](const Axis& a, const Axis& b) {
     return key_number(a.key()) < key_number(b.key());

@@ -113,6 +113,9 @@ std::vector<AxisLayout> layout_of(const Block& block);
 /// Returns the model of the shortest finger in the block. Ignores axes that are expressions.
 solver::ModelParameters shortest_model(solver::ModelParameters model, const Block& block);
 
+/// Returns the model axes of a checked block that change the fall.
+std::vector<const Axis*> fall_axes(solver::ModelParameters model, const Block& block);
+
 /// The tip of any finger can drop by this fraction of the finger's length. H must not exceed the
 /// length. Between these two limits only a computed fall shows whether the tip reaches H.
 inline constexpr double kSurelyReached = 0.9;

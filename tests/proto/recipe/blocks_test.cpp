@@ -294,5 +294,40 @@ TEST(ValidatedPointsTest, InALargeStudyRandomPointsAreValidatedAndOthersFailWhen
   EXPECT_EQ(table.model(kMany - 1).k_N_m, solver::preset("paper").k_N_m);
 }
 
+TEST(FallAxesTest, TheAxesThatChangeTheFallDependOnTheModelAndTheIntegratorOfTheBlock) {
+  const auto keys_of = [](const std::vector<Axis>& axes, solver::ModelParameters model) {
+    const Block block = sampled(axes, SAMPLE_SOBOL, 8);
+    check_block(model, block);
+    std::vector<std::string> keys;
+    for (const Axis* axis : fall_axes(model, block)) {
+      keys.push_back(axis->key());
+    }
+    return keys;
+  };
+  const std::vector<Axis> point{listed("H", {0.5}), listed("mu", {0.4}), listed("e", {1.0})};
+  const auto with_point = [&](std::vector<Axis> axes) {
+    axes.insert(axes.end(), point.begin(), point.end());
+    return axes;
+  };
+  using Keys = std::vector<std::string>;
+  solver::ModelParameters model;
+  EXPECT_EQ(keys_of(with_point({uniform("E", 6e10, 7e10), uniform("k", 1e7, 2e7),
+                                uniform("eta2", 1, 2), uniform("tolerance", 1e-6, 1e-4)}),
+                    model),
+            (Keys{"E", "tolerance"}));
+  const auto radius = with_point({uniform("spectral_radius", 0.5, 0.9)});
+  EXPECT_EQ(keys_of(radius, model), Keys{});
+  model.integrator = solver::Integrator::kGeneralizedAlpha;
+  EXPECT_EQ(keys_of(radius, model), Keys{"spectral_radius"});
+  const auto both =
+      with_point({listed("integrator", {0, 1}), uniform("spectral_radius", 0.5, 0.9)});
+  const auto explicit_only =
+      with_point({listed("integrator", {0}), uniform("spectral_radius", 0.5, 0.9)});
+  EXPECT_EQ(keys_of(both, solver::ModelParameters()), (Keys{"integrator", "spectral_radius"}));
+  EXPECT_EQ(keys_of(explicit_only, model), Keys{"integrator"});
+  model.lengths_m = {0.3, 0.3, 0.3, 0.3};
+  EXPECT_EQ(keys_of(with_point({uniform("length4", 0.2, 0.3)}), model), Keys{"length4"});
+}
+
 }  // namespace
 }  // namespace oblique::protocol

@@ -38,12 +38,13 @@ using Model = ModelParameters;
 template <auto member>
 constexpr ParameterKey key(std::string_view name, std::string_view unit, std::string_view meaning,
                            std::string_view allowed, bool (*is_allowed)(double),
-                           const UsualRange& usual = {}) {
+                           const UsualRange& usual = {},
+                           FallEffect fall_effect = FallEffect::kAlways) {
   const auto get = [](const Model& model) { return static_cast<double>(model.*member); };
   const auto set = [](Model& model, double value) {
     model.*member = static_cast<std::remove_cvref_t<decltype(model.*member)>>(value);
   };
-  return {name, unit, meaning, allowed, is_allowed, get, set, usual};
+  return {name, unit, meaning, allowed, is_allowed, get, set, usual, fall_effect};
 }
 
 constexpr std::array<ParameterKey, 16> kModelKeys{{
@@ -64,9 +65,9 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
     key<&Model::elements_per_link>("elements_per_link", "", "elements a link",
                                    "a whole number from 1 to 256", is_whole<1, 256>),
     key<&Model::k_N_m>("k", "N/m", "normal contact stiffness in compression", "> 0", positive,
-                       {1e4, 1e10}),
+                       {1e4, 1e10}, FallEffect::kNever),
     key<&Model::eta2>("eta2", "", "ratio of normal to tangential contact stiffness", "> 0",
-                      positive, {0.1, 10.0}),
+                      positive, {0.1, 10.0}, FallEffect::kNever),
     key<&Model::tip_mass_kg>("tip_mass", "kg", "point mass at the tip", ">= 0", not_negative,
                              {1e-6, 10.0}),
     key<&Model::integrator>("integrator", "", "how the equations of motion are stepped",
@@ -75,15 +76,15 @@ constexpr std::array<ParameterKey, 16> kModelKeys{{
     key<&Model::spectral_radius>(
         "spectral_radius", "", "spectral radius of generalized-alpha at infinite frequency",
         ">= 0 and < 1 (at 1 nothing damps the multipliers, and they never settle)",
-        [](double v) { return v >= 0.0 && v < 1.0; }),
+        [](double v) { return v >= 0.0 && v < 1.0; }, {}, FallEffect::kWithGeneralizedAlpha),
     key<&Model::dt_s>("dt", "s", "step in contact; 0: chosen by the tolerance", ">= 0",
-                      not_negative),
+                      not_negative, {}, FallEffect::kNever),
     key<&Model::dt_fall_s>("dt_fall", "s", "step in the fall; 0: chosen for the integrator", ">= 0",
                            not_negative),
     key<&Model::tolerance>(
         "tolerance", "", "relative error that chosen steps leave in the outputs of a contact",
         "from 1e-9 (rounding leaves more below) to 0.01 (modes mean nothing above)",
-        [](double v) { return v >= 1e-9 && v <= 1e-2; }),
+        [](double v) { return v >= 1e-9 && v <= 1e-2; }, {}, FallEffect::kBelowDefault),
 }};
 
 constexpr std::array<ParameterKey, 3> kPointKeys{{
@@ -262,23 +263,21 @@ std::string with_likely_cause(std::string error, const ModelParameters& model) {
 ModelParameters fall_model(const ModelParameters& model) {
   const ModelParameters defaults;
   ModelParameters falling = model;
-  falling.k_N_m = defaults.k_N_m;
-  falling.eta2 = defaults.eta2;
-  falling.dt_s = defaults.dt_s;
   falling.step_factor = defaults.step_factor;
-  falling.tolerance = std::min(falling.tolerance, defaults.tolerance);
-  if (falling.integrator != Integrator::kGeneralizedAlpha) {
-    falling.spectral_radius = defaults.spectral_radius;
+  for (const auto& key : kModelKeys) {
+    const double usual = key.get(defaults);
+    if (!changes_fall(key, model) ||
+        (key.fall_effect == FallEffect::kBelowDefault && key.get(model) > usual)) {
+      key.set(falling, usual);
+    }
   }
   return falling;
 }
 
 bool changes_fall(const ParameterKey& key, const ModelParameters& model) {
-  ModelParameters one = model;
-  ModelParameters other = model;
-  key.set(one, 1.0);
-  key.set(other, 2.0);  // differs from 1 even for a key whose values are rounded to integers
-  return !(fall_model(one) == fall_model(other));
+  return key.fall_effect == FallEffect::kWithGeneralizedAlpha
+             ? model.integrator == Integrator::kGeneralizedAlpha
+             : key.fall_effect != FallEffect::kNever;
 }
 
 std::uint64_t fall_hash(const ModelParameters& model) {

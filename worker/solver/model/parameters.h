@@ -49,6 +49,9 @@ struct UsualRange {
   double to = std::numeric_limits<double>::infinity();
 };
 
+/// When the value of a parameter affects the fall. kBelowDefault: larger values have the same fall.
+enum class FallEffect : std::uint8_t { kAlways, kNever, kBelowDefault, kWithGeneralizedAlpha };
+
 /// One numeric parameter: a key of study files, an axis, a flag (`_` becomes `-`) and a column of
 /// the table `models`.
 struct ParameterKey {
@@ -60,6 +63,7 @@ struct ParameterKey {
   double (*get)(const ModelParameters&);
   void (*set)(ModelParameters&, double value);
   UsualRange usual = {};
+  FallEffect fall_effect = FallEffect::kAlways;
 };
 
 /// All numeric model keys in the order of listings. Setting `links` gives every link the first
@@ -110,12 +114,12 @@ struct MeshAccuracy {
 /// Returns the accuracies from coarse to fine meshes.
 std::span<const MeshAccuracy> mesh_accuracies();
 
-/// `model` with the default of every parameter that does not affect its fall: k, eta2, dt, a
-/// tolerance looser than the default, and spectral_radius without generalized-alpha. Models with
-/// equal fall_model() share a fall.
+/// `model` with the default of every parameter that does not affect its fall (FallEffect). Models
+/// with equal fall_model() share a fall.
 ModelParameters fall_model(const ModelParameters& model);
 
-/// Whether models that differ only in this key have different falls.
+/// Returns whether models with the integrator of `model` that differ only in this key may have
+/// different falls.
 bool changes_fall(const ParameterKey& key, const ModelParameters& model);
 
 /// Hash of fall_model().

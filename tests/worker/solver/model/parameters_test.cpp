@@ -127,5 +127,24 @@ TEST(FallModel, ModelsHaveEqualHashesExactlyWhenTheyShareAFall) {
   EXPECT_EQ(fall_hash(contact), fall_hash(ModelParameters()));
 }
 
+TEST(FallModel, AKeyChangesTheFallExactlyIfTwoOfItsValuesHaveDifferentFalls) {
+  for (const Integrator integrator : {Integrator::kExplicit, Integrator::kGeneralizedAlpha}) {
+    ModelParameters model;
+    model.integrator = integrator;
+    for (const auto& key : model_keys()) {
+      std::set<std::uint64_t> falls;
+      for (const double value : {0.0, 1e-8, 1e-6, 1e-4, 0.5, 1.0, 2.0, 1e7}) {
+        if (key.is_allowed(value)) {
+          ModelParameters other = model;
+          key.set(other, value);
+          falls.insert(fall_hash(other));
+        }
+      }
+      EXPECT_EQ(changes_fall(key, model), falls.size() > 1)
+          << key.name << " with " << integrator_name(integrator);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace oblique::solver
