@@ -1,11 +1,11 @@
 #include "proto/address.h"
 
 #include <netdb.h>
-#include <sys/socket.h>
 
 #include <charconv>
 #include <string_view>
 #include <system_error>
+#include <thread>
 
 namespace oblique::protocol {
 namespace {
@@ -41,21 +41,27 @@ std::string host_of(const std::string& url) {
   return is_bracketed ? host.substr(1, host.size() - 2) : host;
 }
 
-Families families_of(const std::string& host) {
-  addrinfo wanted{};
-  wanted.ai_family = AF_UNSPEC;
-  wanted.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
-  if (getaddrinfo(host.c_str(), nullptr, &wanted, &found) != 0) {
-    return {};
+bool is_name(std::string_view host) {
+  return host.find(':') == std::string_view::npos &&
+         host.find_first_not_of("0123456789.") != std::string_view::npos;
+}
+
+AddressLookup::AddressLookup(const std::string& url) : host_(host_of(url)) {
+  if (!is_name(host_)) {
+    return;
   }
-  Families families;
-  for (const addrinfo* address = found; address != nullptr; address = address->ai_next) {
-    families.has_v4 = families.has_v4 || address->ai_family == AF_INET;
-    families.has_v6 = families.has_v6 || address->ai_family == AF_INET6;
-  }
-  freeaddrinfo(found);
-  return families;
+  std::thread([host = host_, found_none = found_none_] {
+    addrinfo* found = nullptr;
+    if (getaddrinfo(host.c_str(), nullptr, nullptr, &found) == 0) {
+      freeaddrinfo(found);
+    } else {
+      *found_none = true;
+    }
+  }).detach();
+}
+
+std::string AddressLookup::error() const {
+  return *found_none_ ? "the name " + host_ + " has no address" : "";
 }
 
 }  // namespace oblique::protocol

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <atomic>
+#include <memory>
 #include <string>
+#include <string_view>
 
 namespace oblique::protocol {
 
@@ -13,14 +16,20 @@ std::string address_error(const std::string& url);
 /// empty for other addresses.
 std::string host_of(const std::string& url);
 
-/// The IP versions for which a host has addresses.
-struct Families {
-  bool has_v4 = false;
-  bool has_v6 = false;
-};
+/// Returns whether a host is a name, not a number.
+bool is_name(std::string_view host);
 
-/// Returns the IP versions of a numeric host, or of the addresses that a name has now; none for an
-/// unknown name. The lookup may take seconds if name servers do not answer.
-Families families_of(const std::string& host);
+/// Looks up the host of a tcp address once, on a thread of its own, because a lookup takes many
+/// seconds if name servers do not answer. Nothing waits for that thread.
+class AddressLookup {
+ public:
+  explicit AddressLookup(const std::string& url);
+  /// Returns the error message if the lookup has ended and found no address, or an empty text.
+  std::string error() const;
+
+ private:
+  std::string host_;
+  std::shared_ptr<std::atomic<bool>> found_none_ = std::make_shared<std::atomic<bool>>(false);
+};
 
 }  // namespace oblique::protocol

@@ -20,6 +20,7 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include "proto/address.h"
 #include "proto/frames.h"
 #include "proto/program/configuration.h"
 #include "proto/program/log.h"
@@ -122,7 +123,13 @@ int run_worker(SessionSettings& settings, std::uint64_t fall_memory_bytes,
                                        ? fall_memory_bytes
                                        : oblique::protocol::available_memory_bytes() /
                                              oblique::solver::kFallsPartOfMemory);
+  const oblique::protocol::AddressLookup address(settings.server);
+  bool has_warned = false;
   settings.on_turn = [&](const std::string& status) {
+    const std::string error = address.error();
+    if (!error.empty() && !std::exchange(has_warned, true)) {
+      spdlog::warn("{}: check --server; trying again", error);
+    }
     notifier.status(status);
     notifier.feed_watchdog(oblique::protocol::Notifier::Clock::now());
   };
@@ -146,8 +153,8 @@ int run_worker(SessionSettings& settings, std::uint64_t fall_memory_bytes,
     constexpr std::chrono::seconds kLongestEnd{5};
     notifier.stopping("stopping", kLongestEnd);
   });
-  if (session.is_solving()) {
-    // Ends the process, because points cannot be interrupted and their results are not needed.
+  if (session.ends_slowly()) {
+    // Ends the process, because points and lookups of names cannot be interrupted.
     spdlog::default_logger()->flush();
     std::_Exit(exit_code);
   }

@@ -44,8 +44,10 @@ class Session {
   /// be recognised. Throws solver::InputError unless `settings.server` is an address.
   int run(int stop_descriptor, const std::function<void()>& on_stop);
 
-  /// Whether a point is being solved. The destructor waits until such points end.
-  bool is_solving() const { return solver_.is_solving() || tracer_.is_solving(); }
+  /// Whether the destructor may wait long: for points, or for the lookup of the server's name.
+  bool ends_slowly() const {
+    return solver_.is_solving() || tracer_.is_solving() || !has_received_;
+  }
 
  private:
   struct Link {

@@ -206,8 +206,9 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
       .program = sibling_program("oblique-server"),
       .arguments = {"--no-config", "--db", settings.database.string(), "--drain", "0",
                     "--worker-port", "0", "--client-port", "0", "--http", settings.http,
-                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--stop-with-parent",
-                    std::to_string(getpid()), "--keys", keys_.file_of(protocol::Role::kServer)},
+                    "--ready-fd", std::to_string(ChildProcess::kHandedOver), "--page-of-file",
+                    "--stop-with-parent", std::to_string(getpid()), "--keys",
+                    keys_.file_of(protocol::Role::kServer)},
       .show_errors = settings.verbose,
       .handed_over = ready.write.number()};
   if (!settings.only_study.empty()) {

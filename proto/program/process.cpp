@@ -172,9 +172,14 @@ void Notifier::send(const std::string& state) const {
     return;
   }
   std::memcpy(address.sun_path, socket_.data(), socket_.size());
+  auto length = static_cast<socklen_t>(sizeof(address));
+  if (socket_.front() == '@') {  // an abstract name, whose length counts
+    address.sun_path[0] = '\0';
+    length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size());
+  }
   const Descriptor sender(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   (void)::sendto(sender.number(), state.data(), state.size(), MSG_NOSIGNAL | MSG_DONTWAIT,
-                 reinterpret_cast<const sockaddr*>(&address), sizeof(address));
+                 reinterpret_cast<const sockaddr*>(&address), length);
 }
 
 }  // namespace oblique::protocol

@@ -92,10 +92,11 @@ zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& setting
 }
 
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt) {
-  // libzmq resolves only one IP version. This option selects it.
-  const auto [has_v4, has_v6] = families_of(host_of(settings.url));
+  // libzmq resolves a name on its own thread, for only one IP version. This option selects it.
+  const std::string host = host_of(settings.url);
+  const bool is_v6 = host.find(':') != std::string::npos;
   try {
-    socket.set(zmq::sockopt::ipv6, has_v6 && (!has_v4 || attempt % 2 == 1));
+    socket.set(zmq::sockopt::ipv6, is_v6 || (is_name(host) && attempt % 2 == 1));
     socket.connect(settings.url);
   } catch (const zmq::error_t& error) {
     refuse(settings, std::string(error.what()) + ": write tcp://HOST:PORT");

@@ -30,9 +30,9 @@ struct DealerSettings {
 zmq::socket_t make_dealer(zmq::context_t& context, const DealerSettings& settings);
 
 /// Starts to connect in the background, and again whenever a connection ends. A host name is
-/// resolved each time. A name may have addresses of both IP versions while the server listens on
-/// one version only. So an even `attempt` uses IPv4 and an odd one IPv6. Throws the errors of
-/// `make_dealer`.
+/// resolved each time, on libzmq's thread, which a closing context waits for. A name may have
+/// addresses of both IP versions while the server listens on one version only. So an even `attempt`
+/// uses IPv4 and an odd one IPv6. Throws the errors of `make_dealer`.
 void connect(zmq::socket_t& socket, const DealerSettings& settings, unsigned attempt = 0);
 
 /// Observes the connections of a socket with one peer: how often it was connected, and whether the

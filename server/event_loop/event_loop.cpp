@@ -95,11 +95,13 @@ EventLoop::EventLoop(LoopSettings settings)
   service.last_worker_id = store_.last_worker_id();
   // Lease numbers are above all numbers of earlier runs, even if the clock was set back.
   service.scheduler.first_lease_id = store_.count_start() << 40U;
-  Ports& ports = *this;
-  service_.emplace(service, ports, store_.studies(), now());
+  std::vector<StoredStudy> studies = store_.studies();
   for (const auto& sentence : store_.skipped()) {
     spdlog::warn("{}", sentence);
   }
+  Ports& ports = *this;
+  // The service may write at once. From here on only the writer's thread uses the store.
+  service_.emplace(service, ports, std::move(studies), now());
 }
 
 // ---- Ports -------------------------------------------------------------------------------------
@@ -136,7 +138,7 @@ void EventLoop::log(Severity severity, const std::string& text) {
 // ---- The loop ----------------------------------------------------------------------------------
 
 LoopEnd EventLoop::run(int stop_fd, const std::function<void()>& take_stop) {
-  writer_.resume_deletions();  // from here on only the writer's thread uses the store
+  writer_.resume_deletions();
   auto next_tick = Clock::now();
   std::array<pollfd, 4> items{{{network_.descriptor(), POLLIN, 0},
                                {web_ ? web_->descriptor() : -1, POLLIN, 0},

@@ -52,6 +52,7 @@ struct Options {
   oblique::server::HttpOptions http;
   int ready_fd = -1;
   double drain_s = 5.0;
+  bool is_of_file = false;  ///< of the page
   oblique::protocol::LogSettings log;
 };
 
@@ -192,6 +193,8 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
       ->type_name("SECONDS")
       ->check(oblique::protocol::number_between(0.0, kLongestDrain_s));
   oblique::protocol::add_stop_with_parent(app, parent);
+  app.add_flag("--page-of-file", options.is_of_file, "Show the name of the database on the page")
+      ->configurable(false);
   configuration.add_log_options(options.log);
   add_limits(app, loop);
 }
@@ -253,7 +256,7 @@ int main(int argc, char** argv) {
       return *exit_code;
     }
     if (options.loop.web) {
-      options.loop.web->page.is_of_file = parent != 0;
+      options.loop.web->page.is_of_file = options.is_of_file;
     }
     oblique::protocol::set_up_log(kProgram, options.log);
     return run(options.loop, options.ready_fd, parent);

@@ -4,6 +4,7 @@
 #include <fstream>
 #include <functional>
 #include <string>
+#include <thread>
 
 #include <sched.h>
 #include <sys/stat.h>
@@ -157,15 +158,16 @@ TEST(Address, MayContainTheNameOfAHost) {
   }
 }
 
-TEST(Address, HasTheFamilyOfItsNotation) {
-  const Families v4 = families_of("192.0.2.1");
-  EXPECT_TRUE(v4.has_v4);
-  EXPECT_FALSE(v4.has_v6);
-  const Families v6 = families_of("2001:db8::1");
-  EXPECT_FALSE(v6.has_v4);
-  EXPECT_TRUE(v6.has_v6);
-  const Families none = families_of("");
-  EXPECT_FALSE(none.has_v4 || none.has_v6);
+TEST(Address, ANameWithoutAddressIsFoundInTheBackground) {
+  const AddressLookup nowhere("tcp://no..name:7601");
+  while (nowhere.error().empty()) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(nowhere.error(), "the name no..name has no address");
+  EXPECT_FALSE(is_name(host_of("inproc://x")));
+  EXPECT_FALSE(is_name("127.0.0.1"));
+  EXPECT_FALSE(is_name("fe80::1%eth0"));
+  EXPECT_TRUE(is_name("node7"));
 }
 
 }  // namespace

@@ -1,10 +1,16 @@
 #include "worker/session.h"
 
+#include <condition_variable>
 #include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+
+#include <dlfcn.h>
+#include <netdb.h>
 
 #include <gtest/gtest.h>
 
@@ -25,6 +31,39 @@ protocol::ServerToWorker patient_welcome() {
   welcome.mutable_welcome()->set_lost_after_ms(600'000);
   return welcome;
 }
+
+/// The name of a host whose lookup does not end before the test releases it.
+class SilentName {
+ public:
+  static constexpr const char* kName = "silent.example";
+
+  static SilentName& instance() {
+    static SilentName name;
+    return name;
+  }
+  int look_up() {
+    std::unique_lock lock(mutex_);
+    is_looked_up_ = true;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return is_released_; });
+    return EAI_AGAIN;
+  }
+  void wait_for_lookup() {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return is_looked_up_; });
+  }
+  void release() {
+    const std::lock_guard lock(mutex_);
+    is_released_ = true;
+    changed_.notify_all();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool is_looked_up_ = false;
+  bool is_released_ = false;
+};
 
 /// The server's side of the socket, controlled by the test. Waiting for a message fails after ten
 /// minutes.
@@ -245,5 +284,25 @@ TEST(SessionTest, AnInvalidAddressIsAnErrorThatNamesIt) {
   }
 }
 
+TEST(Session, StopsWhileTheNameOfTheServerIsLookedUp) {
+  RunningWorker worker(std::string("tcp://") + SilentName::kName + ":7601",
+                       [](const Batch&, auto&, const auto&) {});
+  SilentName::instance().wait_for_lookup();
+  worker.stop();
+  EXPECT_EQ(worker.exit_code(), 0);
+  SilentName::instance().release();
+}
+
 }  // namespace
 }  // namespace oblique::worker
+
+/// Replaces the function of the C library, also for libzmq.
+extern "C" int getaddrinfo(const char* host, const char* service, const addrinfo* hints,
+                           addrinfo** found) {
+  using oblique::worker::SilentName;
+  if (host != nullptr && std::string_view(host) == SilentName::kName) {
+    return SilentName::instance().look_up();
+  }
+  const auto next = reinterpret_cast<decltype(&getaddrinfo)>(dlsym(RTLD_NEXT, "getaddrinfo"));
+  return next(host, service, hints, found);
+}

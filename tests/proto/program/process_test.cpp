@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <cstdlib>
 #include <string>
 #include <utility>
@@ -87,6 +88,21 @@ TEST_F(NotifierTest, WithoutASocketOrWithABrokenOneNothingHappens) {
     notifier.stopping("stopping", 1s);
   }
   EXPECT_TRUE(received().empty());
+}
+
+TEST_F(NotifierTest, AnAbstractSocketIsNotified) {
+  const std::string name = "@oblique-test-" + std::to_string(getpid());
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  name.copy(address.sun_path, name.size());
+  address.sun_path[0] = '\0';
+  close(std::exchange(socket_, ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)));
+  ASSERT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address),
+                 static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size())),
+            0);
+  setenv("NOTIFY_SOCKET", name.c_str(), 1);
+  Notifier().ready("x");
+  EXPECT_EQ(received(), std::vector<std::string>{"READY=1\nSTATUS=x"});
 }
 
 /// Calls `stop_with_parent` in a child process. Returns its result, and whether the child will get
