@@ -188,6 +188,12 @@ TEST(PageFiles, ArePlainUnlessTheClientAcceptsGzip) {
   }
 }
 
+TEST(PageFiles, ThePagePreloadsItsModules) {
+  const std::string page = body_of(PageServer().request("GET", "/", ""));
+  EXPECT_THAT(page, HasSubstr("\n<link rel=\"modulepreload\" href=\"study/study.js\">\n"));
+  EXPECT_THAT(page, Not(HasSubstr("href=\"main.js\"")));
+}
+
 TEST(PageFiles, NameNoAddressFromTheRootOfTheHost) {
   for (const PageFile& file : page_files()) {
     const std::string text(file.plain.begin(), file.plain.end());
