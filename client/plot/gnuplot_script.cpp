@@ -284,10 +284,9 @@ class Script {
       }
       add("set palette defined ({})\n", fmt::join(colours, ", "));
       write_axis("cb", colour_);
-      const double size = std::max(std::abs(colour_(colour_.axis.range.from)),
-                                   std::abs(colour_(colour_.axis.range.to)));
-      const bool needs_room = !is_text_ && (size >= 1e6 || size < 1e-3);  // numbers with exponents
-      out_ += needs_room ? "set rmargin at screen 0.8\n" : "";
+      const double size = std::abs(colour_(colour_.axis.range.to));
+      const bool has_exponents = size >= 1e6 || size < 1e-3;
+      out_ += has_exponents && !is_text_ ? "set rmargin at screen 0.8\n" : "";
     } else {
       out_ += "unset colorbox\n";
     }
@@ -701,11 +700,11 @@ class Script {
     for (const Curve& curve : panel.curves) {
       const bool is_coloured = !curve.colours.empty() && has_colours();
       const auto data = begin_data();
-      const std::size_t step = 1 + curve.x.size() / 1000;  // draws about one point per pixel
+      const std::size_t step = 1 + curve.x.size() / 1000;  // about one point per pixel, and peaks
       for (std::size_t i = 0; i < curve.x.size(); ++i) {
         if (curve.mark == Curve::Mark::kLine && i % step != 0 && i + 1 < curve.x.size() &&
-            std::isfinite(curve.y[i])) {
-          continue;
+            (curve.y[i] - curve.y[i - 1]) * (curve.y[i + 1] - curve.y[i]) > 0.0) {
+          continue;  // neither a peak nor beside a gap
         }
         row({x_(curve.x[i]), y_(curve.y[i])});
         if (is_coloured) {

@@ -126,9 +126,12 @@ class FigureBuilder {
   void span(FigureAxis& axis, const std::vector<double>& values, double wider_by = 0.0,
             const std::optional<Range>& given = {}) {
     if (given && !is_drawable(given->from, axis.is_logarithmic)) {
-      throw InputError(
-          fmt::format("--range {} is not allowed on a logarithmic scale: FROM must be above 0",
-                      request_.range));
+      throw InputError(fmt::format(
+          "--range {} is not allowed with {}: FROM must be above 0 on a logarithmic scale",
+          request_.range,
+          !request_.lines.empty()       ? "--log-y"
+          : !request_.histogram.empty() ? "--log-x"
+                                        : "--log-colour"));
     }
     const Range all = range_of(values, axis.is_logarithmic);
     axis.span(given.value_or(all), given ? 0.0 : wider_by);

@@ -229,6 +229,16 @@ TEST(GnuplotScript, WritesNarrowRangesAsDifferencesFromANumberInTheLabel) {
   EXPECT_THAT(text, testing::ContainsRegex("set xrange \\[0:[19]\\.?[0-9]*e-(09|10)\\]"));
 }
 
+TEST(GnuplotScript, KeepsThePeaksOfACurveWithManyPoints) {
+  Figure figure = test::lines_of(1, 5001);
+  Curve& curve = figure.panels[0].curves[0];
+  curve.mark = Curve::Mark::kLine;
+  curve.y[1234] = 9.876543;
+  const auto text = script(figure);
+  EXPECT_THAT(text, HasSubstr(" 9876543\n"));
+  EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 1500);
+}
+
 TEST(GnuplotScript, OfAFigureWithoutPanelsIsRefused) {
   EXPECT_ANY_THROW(picture_of({}, PictureFormat::kSvg));
   EXPECT_ANY_THROW(picture_of({}, PictureFormat::kScript));
