@@ -74,7 +74,7 @@ function logTicks(least, most, wanted) {
 
 /** Formats the difference of a value from the number of baseOf. */
 export function tickText(value, base = 0) {
-  const shown = Number((value - base).toPrecision(base === 0 ? 7 : 4));
+  const shown = Number((value - base).toPrecision(base === 0 ? 7 : 3));
   const size = Math.abs(shown);
   const isLong = shown !== 0 && (size >= 1e5 || size < 1e-3);
   const text = isLong ? shown.toExponential().replace("e+", "e") : String(shown);
