@@ -234,7 +234,7 @@ CLI::Option* add_text(CLI::App& command, const std::string& flag, std::string& v
   return command.add_option(flag, value, help)->type_name(type);
 }
 
-/// Throws InputError if flags are given that have no effect on this kind of picture.
+/// Makes the command line refuse the option together with any of `others`.
 void exclude(CLI::Option* option, const std::vector<CLI::Option*>& others) {
   for (auto* other : others) {
     if (other != option) {

@@ -20,9 +20,14 @@
 namespace oblique::client::plot {
 namespace {
 
+// Smallest and largest size of a number in a picture. The units of axes and their margins multiply
+// it by less than 1e7, which gnuplot can show.
+constexpr double kSmallest = 1e-300;
+constexpr double kLargest = 1e301;
+
 /// Range with a margin around a single value.
 Range around(double value, bool is_logarithmic) {
-  const double half = value == 0.0 ? 0.5 : 0.1 * std::abs(value);
+  const double half = std::abs(value) < kSmallest ? 0.5 : 0.1 * std::abs(value);
   return is_logarithmic ? Range{value / 1.25, value * 1.25} : Range{value - half, value + half};
 }
 
@@ -50,13 +55,9 @@ std::string label_of(const std::string& name) {
 }
 
 /// Returns about `bins` bin edges around the range, at multiples of 1, 2 or 5 times a power of ten.
+/// The values of the range must not count as one: then `i` is below 1e15 and grows by 1.
 std::vector<double> round_edges(const Range& range, double bins) {
-  const double raw = (range.to - range.from) / bins;
-  const double decade = std::pow(10.0, std::floor(std::log10(raw)));
-  double step = 10.0 * decade;
-  for (const double times : {5.0, 2.0, 1.0}) {
-    step = times * decade >= raw * 0.999 ? times * decade : step;
-  }
+  const double step = round_step(range, bins);
   std::vector<double> edges;
   for (double i = std::floor(range.from / step + 1e-9); edges.empty() || edges.back() <= range.to;
        ++i) {
@@ -69,25 +70,46 @@ std::vector<double> round_edges(const Range& range, double bins) {
 
 }  // namespace
 
-Range range_of(const std::vector<double>& values, bool positive_only) {
+double round_step(const Range& range, double parts) {
+  const double raw = (range.to - range.from) / parts;
+  const double decade = std::pow(10.0, std::floor(std::log10(raw)));
+  double step = 10.0 * decade;
+  for (const double times : {5.0, 2.0, 1.0}) {
+    step = times * decade >= raw * 0.999 ? times * decade : step;
+  }
+  return step;
+}
+
+bool is_drawable(double value, bool is_logarithmic) {
+  return std::abs(value) <= kLargest && (!is_logarithmic || value >= kSmallest);
+}
+
+Range range_of(const std::vector<double>& values, bool is_logarithmic) {
   Range range{HUGE_VAL, -HUGE_VAL};
   for (const double value : values) {
-    if (std::isfinite(value) && (!positive_only || value > 0.0)) {
+    if (is_drawable(value, is_logarithmic)) {
       range = united(range, {value, value});
     }
   }
-  return range.from <= range.to ? range : Range{positive_only ? 0.1 : 0.0, 1.0};
+  return range.from <= range.to ? range : Range{is_logarithmic ? 0.1 : 0.0, 1.0};
 }
 
 Range united(const Range& one, const Range& other) {
   return {std::min(one.from, other.from), std::max(one.to, other.to)};
 }
 
+bool counts_as_one(const Range& range) {
+  const double size = std::max(std::abs(range.from), std::abs(range.to));
+  return !(range.to - range.from > std::max(1e-12 * size, kSmallest));
+}
+
 void FigureAxis::span(const Range& values, double wider_by) {
-  range = values.from < values.to ? values : around(values.from, is_logarithmic);
+  range = counts_as_one(values) ? around(values.from, is_logarithmic) : values;
   const Range narrow = range;
   range = {value_at(-wider_by), value_at(1.0 + wider_by)};
-  if (!is_logarithmic && wider_by > 0.0) {
+  if (is_logarithmic) {
+    range = {std::max(range.from, kSmallest / 10.0), std::min(range.to, kLargest)};
+  } else if (wider_by > 0.0) {
     range.from = narrow.from * range.from < 0.0 ? 0.0 : range.from;
     range.to = narrow.to * range.to < 0.0 ? 0.0 : range.to;
   }
@@ -97,16 +119,18 @@ double FigureAxis::share_of(double value) const {
   if (!is_logarithmic) {
     return (value - range.from) / (range.to - range.from);
   }
-  return value > 0.0 ? std::log(value / range.from) / std::log(range.to / range.from)
-                     : std::nan("");
+  const double start = std::log(range.from);
+  return value > 0.0 ? (std::log(value) - start) / (std::log(range.to) - start) : std::nan("");
 }
 
 double FigureAxis::value_at(double share) const {
   if (share == 0.0 || share == 1.0) {
     return share == 0.0 ? range.from : range.to;
   }
-  return is_logarithmic ? range.from * std::pow(range.to / range.from, share)
-                        : range.from + share * (range.to - range.from);
+  // The quotient of the ends may exceed the largest number, but their logarithms do not.
+  return is_logarithmic
+             ? std::exp(std::log(range.from) + share * (std::log(range.to) - std::log(range.from)))
+             : range.from + share * (range.to - range.from);
 }
 
 FigureAxis axis_of(const std::string& name, const std::string& unit) {
@@ -121,9 +145,9 @@ FigureAxis axis_of(const std::string& name, const std::string& unit) {
   return axis;
 }
 
-std::string shown_value(const FigureAxis& axis, double value) {
+std::string shown_value(const FigureAxis& axis, double value, int digits) {
   std::string text =
-      fmt::format("{} = {}", axis.name, solver::readable_number(value * axis.per_unit));
+      fmt::format("{} = {}", axis.name, solver::readable_number(value * axis.per_unit, digits));
   const auto bracket = axis.label.rfind(" [");
   if (bracket != std::string::npos) {
     text += ' ' + axis.label.substr(bracket + 2, axis.label.size() - bracket - 3);
@@ -147,7 +171,8 @@ std::vector<double> edges_between(const std::vector<double>& values, bool is_log
   }
   // Makes the outer cells symmetric about their values.
   const auto mirrored = [is_logarithmic](double end, double inner) {
-    return is_logarithmic ? end / inner * end : end + (end - inner);
+    return is_logarithmic ? std::clamp(end / inner * end, kSmallest / 10.0, kLargest)
+                          : end + (end - inner);
   };
   edges.front() = mirrored(values.front(), edges[1]);
   edges.push_back(mirrored(values.back(), edges.back()));
@@ -280,13 +305,13 @@ CellAxis cells_between(const FigureAxis& axis, std::size_t cells) {
 std::vector<double> axis_values(std::vector<double> of_study, const AnswerColumn& column) {
   std::vector<double> others = column.numbers;
   std::erase_if(others, [&of_study](double number) {
-    return std::isnan(number) || std::binary_search(of_study.begin(), of_study.end(), number);
+    return !is_drawable(number) || std::binary_search(of_study.begin(), of_study.end(), number);
   });
   of_study.insert(of_study.end(), others.begin(), others.end());
   std::sort(of_study.begin(), of_study.end());
   // Merges values that differ only because different machines computed them.
   const auto end = std::unique(of_study.begin(), of_study.end(), [](double a, double b) {
-    return std::abs(b - a) <= 1e-12 * std::abs(b);
+    return counts_as_one({a, b});
   });
   of_study.erase(end, of_study.end());
   return of_study;
@@ -348,15 +373,21 @@ GatheredLines gathered_lines(const Answer& answer, const std::vector<double>& x_
     double sum = 0.0;
     std::uint64_t count = 0;
   };
+  const auto merged = [](const std::vector<double>& values, double value) {
+    const auto next = std::lower_bound(values.begin(), values.end(), value);
+    return next != values.begin() && counts_as_one({*(next - 1), value}) ? *(next - 1) : *next;
+  };
   std::map<double, std::map<double, Sum>> lines;
+  const auto places = axis_values(x_values, answer[0]);
+  const auto names = answer.size() < 3 ? std::vector<double>{} : axis_values({}, answer[2]);
   const auto& x = answer[0].numbers;
   const auto& y = answer[1].numbers;
   for (std::size_t row = 0; row < x.size(); ++row) {
     const double by = answer.size() < 3 ? 0.0 : answer[2].numbers[row];
-    if (std::isnan(by) || std::isnan(x[row])) {
+    if (!is_drawable(by) || !is_drawable(x[row])) {
       continue;
     }
-    Sum& sum = lines[by][x[row]];
+    Sum& sum = lines[names.empty() ? by : merged(names, by)][merged(places, x[row])];
     if (!std::isnan(y[row])) {
       sum.sum += y[row];
       ++sum.count;
@@ -366,7 +397,8 @@ GatheredLines gathered_lines(const Answer& answer, const std::vector<double>& x_
   for (auto& [value, points] : lines) {
     const double first = points.begin()->first;
     const double last = points.rbegin()->first;
-    for (const double at : x_values) {
+    for (const double study_x : x_values) {
+      const double at = merged(places, study_x);
       if (at > first && at < last) {
         points.try_emplace(at);
       }

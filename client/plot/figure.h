@@ -20,10 +20,18 @@ struct Range {
   bool operator==(const Range&) const = default;
 };
 
-/// The smallest range that contains all finite values, or with `positive_only` all positive ones.
-/// Returns {0, 1} or {0.1, 1} if there are none.
-Range range_of(const std::vector<double>& values, bool positive_only = false);
+/// Whether a picture can show the value. Sizes beyond 1e301 would overflow in gnuplot; a
+/// logarithmic axis shows no value below 1e-300.
+bool is_drawable(double value, bool is_logarithmic = false);
+
+/// The smallest range that contains all drawable values. Returns {0, 1} or {0.1, 1} if there are
+/// none.
+Range range_of(const std::vector<double>& values, bool is_logarithmic = false);
 Range united(const Range& one, const Range& other);
+
+/// Whether all values in the range count as one value, because they differ by at most 1e-12 of
+/// their size. Machines may round the same value differently by as much.
+bool counts_as_one(const Range& range);
 
 /// An axis of a panel, or a colour scale.
 struct FigureAxis {
@@ -33,8 +41,8 @@ struct FigureAxis {
   bool is_logarithmic = false;
   double per_unit = 1.0;  ///< factor from SI units to shown units
 
-  /// Sets the range to `values`, extended at both ends by the share `wider_by`. A single value gets
-  /// a margin. A range that does not contain 0 is not extended across 0.
+  /// Sets the range to `values`, extended at both ends by the share `wider_by`. Values that count
+  /// as one get a margin. A range that does not contain 0 is not extended across 0.
   void span(const Range& values, double wider_by = 0.0);
   /// Position on the axis, from 0 at its start to 1 at its end; NaN if the value has no position.
   double share_of(double value) const;
@@ -46,7 +54,7 @@ struct FigureAxis {
 FigureAxis axis_of(const std::string& name, const std::string& unit);
 
 /// Formats a value with name and unit: "H = 1 m".
-std::string shown_value(const FigureAxis& axis, double value);
+std::string shown_value(const FigureAxis& axis, double value, int digits = 6);
 
 /// A line that connects points in order, or only the points. NaN leaves a gap.
 struct Curve {
@@ -149,6 +157,9 @@ struct Figure {
   std::vector<std::string> notes = {};     ///< sentences below the picture
 };
 
+/// Returns 1, 2 or 5 times a power of ten that divides the range in at most about `parts` parts.
+double round_step(const Range& range, double parts);
+
 /// Edges halfway between ascending values; a single value gets a margin.
 std::vector<double> edges_between(const std::vector<double>& values, bool is_logarithmic);
 
@@ -214,8 +225,9 @@ struct GatheredLines {
 };
 
 /// Groups rows of x, y and, optionally, the value that distinguishes lines. Lines are sorted by x;
-/// several rows at one x are averaged. A line has a gap at each row without a value. It also has a
-/// gap at each of `x_values` between its ends for which it has no row.
+/// several rows at one x are averaged. Values of a column that count as one are one value. A line
+/// has a gap at each row without a value. It also has a gap at each of `x_values` between its ends
+/// for which it has no row.
 GatheredLines gathered_lines(const Answer& answer, const std::vector<double>& x_values);
 
 }  // namespace oblique::client::plot

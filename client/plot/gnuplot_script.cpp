@@ -16,6 +16,7 @@
 #include "client/plot/figure.h"
 #include "client/plot/picture_file.h"
 #include "proto/text.h"
+#include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 
 namespace oblique::client::plot {
@@ -44,13 +45,6 @@ unset logscale {0}
 set {0}tics autofreq
 set format {0} '%h'
 set {0}range [{2}:{3}]
-)";
-
-/// Template of the ticks of a logarithmic axis: {0} is its letter, {1} the digits to mark, because
-/// gnuplot marks only powers of ten by default. gnuplot omits ticks outside the range.
-constexpr std::string_view kLogTicks = R"(set logscale {0}
-set {0}tics ()
-do for [power=-9:9] {{ do for [digit in '{1}'] {{ set {0}tics add (digit*10.0**power) }} }}
 )";
 
 constexpr std::array<std::uint32_t, 11> kViridis{0x440154, 0x482475, 0x414487, 0x355f8d,
@@ -206,6 +200,33 @@ std::string number(double value) {
   return std::isfinite(value) ? fmt::format("{:.8g}", value) : "NaN";
 }
 
+/// Converts the values of an axis to the numbers of a script. gnuplot shows six digits. If the
+/// range is too narrow for these, the numbers are differences from a round number, which the label
+/// names, and the axis is linear.
+struct Shown {
+  FigureAxis axis;
+  double offset = 0.0;  ///< in the shown unit
+
+  explicit Shown(const FigureAxis& of) : axis(of) {
+    axis.span(of.range);  // no range is empty
+    const auto [from, to] = axis.range;
+    const double size = axis.per_unit * std::max(std::abs(from), std::abs(to));
+    const double width = axis.per_unit * (to - from);
+    if (width > 1e-4 * size) {
+      return;
+    }
+    const auto digits =
+        static_cast<int>(std::floor(std::log10(size)) - std::floor(std::log10(1.01 * width)));
+    const std::string round = solver::readable_number(axis.per_unit * 0.5 * (from + to), digits);
+    offset = solver::number_of(round).value_or(0.0);
+    axis.is_logarithmic = false;
+    axis.label.insert(
+        std::min(axis.label.rfind(" ["), axis.label.size()),
+        offset > 0.0 ? " \u2212 " + round : " + " + solver::readable_number(-offset, digits));
+  }
+  double operator()(double value) const { return value * axis.per_unit - offset; }
+};
+
 /// Breaks a text at spaces into lines of at most `letters` characters.
 std::vector<std::string> lines_of(const std::string& text, double letters) {
   return wrapped(text, static_cast<std::size_t>(std::max(letters, 8.0)));
@@ -229,10 +250,21 @@ std::size_t rows_of(const Figure& figure) {
 class Script {
  public:
   Script(const Figure& figure, Size size, bool is_text)
-      : figure_(figure), size_(size), is_text_(is_text) {
+      : figure_(figure),
+        size_(size),
+        is_text_(is_text),
+        colour_(figure.colours.value_or(FigureAxis())) {
+    if (figure.panels.empty()) {
+      throw solver::InputError("this answer has no picture: leave out --out and --show");
+    }
     const double letters = (size.width - 2.0 * kMargin) / kLetter;
     if (!figure.subtitle.empty()) {
       subtitle_ = lines_of(figure.subtitle, letters);
+    }
+    for (const Panel& panel : figure.panels) {
+      if (const Shown y(panel.y); is_text && y.offset != 0.0) {
+        subtitle_.push_back("vertical axis: " + y.axis.label);  // terminals show no such label
+      }
     }
     for (const auto& note : figure.notes) {
       const auto lines = lines_of(note, letters);
@@ -251,7 +283,10 @@ class Script {
         colours.push_back(fmt::format("{} '#{:06x}'", colours.size(), colour));
       }
       add("set palette defined ({})\n", fmt::join(colours, ", "));
-      write_axis("cb", *figure_.colours);
+      write_axis("cb", colour_);
+      const double size = std::abs(colour_(colour_.axis.range.to));
+      const bool has_exponents = size >= 1e6 || size < 1e-3;
+      out_ += has_exponents && !is_text_ ? "set rmargin at screen 0.8\n" : "";
     } else {
       out_ += "unset colorbox\n";
     }
@@ -309,7 +344,6 @@ class Script {
     return "title " + gnuplot_text(title);
   }
   bool has_colours() const { return figure_.colours && !figure_.is_empty; }
-  double colour_unit() const { return figure_.colours ? figure_.colours->per_unit : 1.0; }
 
   void write_texts() {
     constexpr std::string_view kGrey = " tc rgb '#555f6b'";
@@ -329,14 +363,27 @@ class Script {
           size_.height - kMargin / 2.0 - kLine * (static_cast<double>(notes_.size()) - 0.5), kGrey);
   }
 
-  void write_axis(std::string_view letter, const FigureAxis& axis) {
-    const Range range{axis.range.from * axis.per_unit, axis.range.to * axis.per_unit};
+  void write_axis(std::string_view letter, const Shown& shown) {
+    const FigureAxis& axis = shown.axis;
+    const Range range{shown(axis.range.from), shown(axis.range.to)};
     add(kAxis, letter, gnuplot_text(axis.label), number(range.from), number(range.to));
-    const double decades = axis.is_logarithmic ? std::log10(range.to / range.from) : 0.0;
-    if (decades > 3.0) {
-      add("set logscale {0}\nset format {0} '10^{{%T}}'\n", letter);
-    } else if (axis.is_logarithmic) {
-      add(kLogTicks, letter, decades < 1.0 ? "1 2 3 4 5 6 7 8 9" : "1 2 5");
+    if (!axis.is_logarithmic) {
+      return;
+    }
+    // gnuplot marks only powers of ten by default. It omits ticks outside the range.
+    const double decades = std::log10(range.to) - std::log10(range.from);
+    const double step = round_step(range, 6.0);
+    add("set logscale {}\n", letter);
+    if (decades < 0.9) {
+      add("set {0}tics ()\ndo for [i={1:.0f}:{2:.0f}] {{ set {0}tics add (i*{3:g}) }}\n", letter,
+          std::ceil(range.from / step), std::floor(range.to / step), step);
+    } else if (decades < 3.0) {
+      add("set {0}tics ()\ndo for [power={1:.0f}:{2:.0f}] {{ do for [digit in '{3}'] {{ "
+          "set {0}tics add (digit*10.0**power) }} }}\n",
+          letter, std::floor(std::log10(range.from)), std::floor(std::log10(range.to)),
+          decades < 2.5 ? "1 2 5" : "1 3");
+    } else if (!is_text_) {
+      add("set format {} '10^{{%T}}'\n", letter);
     }
   }
 
@@ -405,16 +452,17 @@ class Script {
     titles_.clear();
     out_ += figure_.panels.size() == 1 ? "\n# Axes\n" : fmt::format("\n# Panel {}\n", index + 1);
     write_frame(panel, index);
-    write_axis("x", panel.x);
-    FigureAxis y = panel.y;
+    x_ = Shown(panel.x);
+    y_ = Shown(panel.y);
     if (is_text_ && figure_.panels.size() > 1) {
-      y.label.clear();  // the label would cover the numbers of the ticks
+      y_.axis.label.clear();  // the label would cover the numbers of the ticks
     }
-    write_axis("y", y);
+    write_axis("x", x_);
+    write_axis("y", y_);
     for (const Span& span : panel.spans) {
       if (!is_text_) {
         add("set object rectangle from {}, graph 0 to {}, graph 1 behind {}\n",
-            number(span.from * panel.x.per_unit), number(span.to * panel.x.per_unit),
+            number(x_(span.from)), number(x_(span.to)),
             kSpanStyles[static_cast<std::size_t>(span.kind)].second);
       }
     }
@@ -451,12 +499,11 @@ class Script {
       if (kind == kNoKind && cells.states[i] != CellState::kSolved) {
         continue;
       }
-      const double x0 = panel.x.per_unit * cells.x.edges[i % cells.columns()];
-      const double x1 = panel.x.per_unit * cells.x.edges[(end - 1) % cells.columns() + 1];
-      const double y0 = panel.y.per_unit * cells.y.edges[line];
-      row({x0, y0, x0, x1, y0, panel.y.per_unit * cells.y.edges[line + 1],
-           static_cast<double>(kind),
-           kind == kNoKind ? cells.values[i] * colour_unit()
+      const double x0 = x_(cells.x.edges[i % cells.columns()]);
+      const double x1 = x_(cells.x.edges[(end - 1) % cells.columns() + 1]);
+      const double y0 = y_(cells.y.edges[line]);
+      row({x0, y0, x0, x1, y0, y_(cells.y.edges[line + 1]), static_cast<double>(kind),
+           kind == kNoKind ? colour_(cells.values[i])
                            : static_cast<double>(kinds[static_cast<std::size_t>(kind)].colour)});
     }
     out_ += "EOD\n";
@@ -507,10 +554,10 @@ class Script {
     for (std::size_t i = 0; i < cells.values.size(); ++i) {
       const std::size_t column = i % cells.columns();
       const std::size_t line = i / cells.columns();
-      const double x0 = panel.x.per_unit * cells.x.edges[column];
-      const double x1 = panel.x.per_unit * cells.x.edges[column + 1];
-      const double y0 = panel.y.per_unit * cells.y.edges[line];
-      const double y1 = panel.y.per_unit * cells.y.edges[line + 1];
+      const double x0 = x_(cells.x.edges[column]);
+      const double x1 = x_(cells.x.edges[column + 1]);
+      const double y0 = y_(cells.y.edges[line]);
+      const double y1 = y_(cells.y.edges[line + 1]);
       if (column + 1 < cells.columns() && differ(i, i + 1)) {
         pieces.push_back({x1, y0, 0.0, y1 - y0});
       }
@@ -554,8 +601,8 @@ class Script {
         letter = kLightToDark[static_cast<std::size_t>(share * 8.999)];
         colour = kViridis[static_cast<std::size_t>(share * 10.0 + 0.5)];
       }
-      add("{} {} \"{}\" {}\n", number(panel.x.value_at(raster.x_share(part)) * panel.x.per_unit),
-          number(panel.y.value_at(raster.y_share(part)) * panel.y.per_unit), letter, colour);
+      add("{} {} \"{}\" {}\n", number(x_(panel.x.value_at(raster.x_share(part)))),
+          number(y_(panel.y.value_at(raster.y_share(part)))), letter, colour);
     }
     out_ += "EOD\n";
     plot("{} using 1:2:3:4 with labels tc rgb variable notitle", data);
@@ -625,8 +672,8 @@ class Script {
     for (std::size_t i = 0; i < bars.heights.size(); ++i) {
       const auto at = static_cast<double>(i);
       if (bars.names.empty()) {
-        const double from = bars.edges[i] * panel.x.per_unit;
-        row({from, 0.0, from, bars.edges[i + 1] * panel.x.per_unit, panel.y.range.from,
+        const double from = x_(bars.edges[i]);
+        row({from, 0.0, from, x_(bars.edges[i + 1]), panel.y.range.from,
              std::max(bars.heights[i], panel.y.range.from)});
       } else {
         row({0.0, at, std::min(0.0, bars.heights[i]), std::max(0.0, bars.heights[i]), at - 0.36,
@@ -653,16 +700,16 @@ class Script {
     for (const Curve& curve : panel.curves) {
       const bool is_coloured = !curve.colours.empty() && has_colours();
       const auto data = begin_data();
-      const std::size_t step = 1 + curve.x.size() / 1000;  // draws about one point per pixel
+      const std::size_t step = 1 + curve.x.size() / 1000;  // about one point per pixel, and peaks
       for (std::size_t i = 0; i < curve.x.size(); ++i) {
         if (curve.mark == Curve::Mark::kLine && i % step != 0 && i + 1 < curve.x.size() &&
-            std::isfinite(curve.y[i])) {
-          continue;
+            (curve.y[i] - curve.y[i - 1]) * (curve.y[i + 1] - curve.y[i]) > 0.0) {
+          continue;  // neither a peak nor beside a gap
         }
-        row({curve.x[i] * panel.x.per_unit, curve.y[i] * panel.y.per_unit});
+        row({x_(curve.x[i]), y_(curve.y[i])});
         if (is_coloured) {
           out_.back() = ' ';
-          row({curve.colours[i] * colour_unit()});
+          row({colour_(curve.colours[i])});
         }
       }
       out_ += "EOD\n";
@@ -687,6 +734,9 @@ class Script {
   const Figure& figure_;
   const Size size_;
   const bool is_text_;
+  const Shown colour_;     // colour scale
+  Shown x_{FigureAxis()};  // axes of the panel
+  Shown y_{FigureAxis()};
   std::vector<std::string> subtitle_;
   std::vector<std::string> notes_;
   struct {

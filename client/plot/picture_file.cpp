@@ -158,10 +158,10 @@ std::string output_of_gnuplot(const std::string& script) {
 
 std::string picture_of(const Figure& figure, PictureFormat format,
                        const std::optional<Size>& size) {
+  const Size in_pixels = size.value_or(own_size(figure));
   if (format == PictureFormat::kCsv) {
     return csv_of(figure);
   }
-  const Size in_pixels = size.value_or(own_size(figure));
   return format == PictureFormat::kScript
              ? script_of(figure, PictureFormat::kSvg, in_pixels, "picture.svg")
              : output_of_gnuplot(script_of(figure, format, in_pixels));

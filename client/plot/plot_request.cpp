@@ -189,7 +189,11 @@ void add_term(std::string& sql, const std::string& term) {
 /// Fixes the axis at a value, which the subtitle of the picture shows.
 void fix(Condition& condition, const StudyAxis& axis, double value) {
   if (axis.varies()) {
-    const std::string term = fmt::format("{} = {}", axis.column, solver::exact_number(value));
+    // Rows contain values as a worker computed them, which may differ in the last bits.
+    const double margin = 1e-12 * std::abs(value);
+    const std::string term =
+        fmt::format("{} BETWEEN {} AND {}", axis.column, solver::exact_number(value - margin),
+                    solver::exact_number(value + margin));
     add_term(condition.sql, term);
     add_term(condition.sql_without_where, term);
   }
@@ -395,14 +399,16 @@ std::optional<Range> range_given(const PlotRequest& request) {
     return std::nullopt;
   }
   const auto colon = text.find(':');
-  const auto from = solver::number_of(text.substr(0, colon));
-  const auto to =
-      colon == std::string::npos ? std::nullopt : solver::number_of(text.substr(colon + 1));
-  if (!from || !to || !(*from < *to) || !std::isfinite(*from) || !std::isfinite(*to)) {
+  const double from = solver::number_of(text.substr(0, colon)).value_or(std::nan(""));
+  const double to =
+      solver::number_of(text.substr(std::min(colon, text.size() - 1) + 1)).value_or(std::nan(""));
+  if (!is_drawable(from) || !is_drawable(to) || counts_as_one({from, to})) {
     throw InputError(fmt::format(
-        "--range {} is not allowed: it must be FROM:TO in SI units with FROM < TO", text));
+        "--range {} is not allowed: it must be FROM:TO in SI units with FROM < TO, at most 1e301 "
+        "and not closer than 1e-12 of their size",
+        text));
   }
-  return Range{*from, *to};
+  return Range{from, to};
 }
 
 std::pair<std::string, std::string> scatter_columns(const PlotRequest& request) {

@@ -204,9 +204,7 @@ void fit(FigureAxis& axis, const std::vector<Curve>& curves, std::vector<double>
   for (const Curve& curve : curves) {
     all.insert(all.end(), (curve.*values).begin(), (curve.*values).end());
   }
-  const Range range = range_of(all);
-  const double more = 0.05 * (range.to - range.from);
-  axis.range = {range.from - more, range.to + more};
+  axis.span(range_of(all), 0.05);
 }
 
 std::optional<PointPanel> point_panel_named(const std::string& name) {

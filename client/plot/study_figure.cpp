@@ -30,10 +30,6 @@ constexpr std::size_t kMaxMarked = 60;       // lines with more points have no m
 constexpr std::size_t kMaxDots = 4000;       // maximum number of points drawn one by one
 constexpr std::size_t kMaxNames = 16;        // maximum number of bars for texts
 
-bool is_drawable(double value, bool is_logarithmic) {
-  return std::isfinite(value) && (!is_logarithmic || value > 0.0);
-}
-
 std::string counted(std::uint64_t count, const std::string& noun) {
   return client::counted(count, noun, noun + "s");
 }
@@ -125,6 +121,27 @@ class FigureBuilder {
     note("Nothing to draw: " + why + ".");
   }
 
+  /// Sets the range of the axis to the drawable values, or to --range. Reports if different values
+  /// count as one.
+  void span(FigureAxis& axis, const std::vector<double>& values, double wider_by = 0.0,
+            const std::optional<Range>& given = {}) {
+    if (given && !is_drawable(given->from, axis.is_logarithmic)) {
+      throw InputError(fmt::format(
+          "--range {} is not allowed with {}: FROM must be above 0 on a logarithmic scale",
+          request_.range,
+          !request_.lines.empty()       ? "--log-y"
+          : !request_.histogram.empty() ? "--log-x"
+                                        : "--log-colour"));
+    }
+    const Range all = range_of(values, axis.is_logarithmic);
+    axis.span(given.value_or(all), given ? 0.0 : wider_by);
+    if (all.from < all.to && counts_as_one(all)) {
+      note(fmt::format("All values of {} differ by less than 1e-12 of their size and count as one.",
+                       axis.name));
+      tell_(figure_.notes.back());
+    }
+  }
+
   /// Queries the columns of the points that meet a condition. If grouped, the answer has one row
   /// per combination of values.
   Answer query(const std::vector<std::string>& columns, const std::string& where,
@@ -180,8 +197,8 @@ class FigureBuilder {
   /// Sets the range of the colours from --range or the values; adds a note if values lie outside.
   void set_colours(FigureAxis axis, const std::vector<double>& values) {
     axis.is_logarithmic = request_.is_colour_logarithmic;
+    span(axis, values, 0.0, range_given(request_));
     const Range all = range_of(values, axis.is_logarithmic);
-    axis.span(range_given(request_).value_or(all));
     if (all.from < axis.range.from || all.to > axis.range.to) {
       note(fmt::format(
           "Values range from {} to {}; those outside the scale have the colour of its nearest end.",
@@ -252,8 +269,8 @@ class FigureBuilder {
     }
     // Chooses the number of cells so that a cell has about three points.
     const double side = std::sqrt(static_cast<double>(answer[0].numbers.size()) / 3.0);
-    panel_.x.span(range_of(answer[0].numbers, panel_.x.is_logarithmic));
-    panel_.y.span(range_of(answer[1].numbers, panel_.y.is_logarithmic));
+    span(panel_.x, answer[0].numbers);
+    span(panel_.y, answer[1].numbers);
     return gather_scattered(answer, static_cast<std::size_t>(std::clamp(side, 8.0, 320.0)));
   }
 
@@ -261,14 +278,12 @@ class FigureBuilder {
   Gathered gather_scattered(const Answer& answer, std::size_t most) const {
     // An axis with few different values, such as those of a grid, gets fewer cells than values;
     // otherwise empty cells would form stripes.
-    const auto cells_for = [most](const FigureAxis& axis, std::vector<double> values) {
-      std::sort(values.begin(), values.end());
-      const auto different =
-          static_cast<std::size_t>(std::unique(values.begin(), values.end()) - values.begin());
+    const auto cells_for = [most](const FigureAxis& axis, const AnswerColumn& column) {
+      const std::size_t different = axis_values({}, column).size();
       return cells_between(axis, std::clamp<std::size_t>(different * 9 / 10, 2, most));
     };
-    auto gathered = gathered_in(answer, cells_for(panel_.x, answer[0].numbers),
-                                cells_for(panel_.y, answer[1].numbers));
+    auto gathered =
+        gathered_in(answer, cells_for(panel_.x, answer[0]), cells_for(panel_.y, answer[1]));
     auto& states = gathered.cells.states;
     std::replace(states.begin(), states.end(), CellState::kNoResult, CellState::kNoPoint);
     return gathered;
@@ -413,9 +428,16 @@ class FigureBuilder {
         !are_coloured && !curves.empty() && curves.front().x.size() <= kMaxMarked;
     FigureAxis by_axis = by ? axis_for("--by", *by, answer[2], false) : FigureAxis();
     panel_.by_name = by_axis.name;
+    int digits = 6;  // more if values that distinguish lines differ in later ones
+    for (std::size_t i = 1; by && i < curves.size(); ++i) {
+      while (digits < 17 && shown_value(by_axis, *curves[i - 1].by, digits) ==
+                                shown_value(by_axis, *curves[i].by, digits)) {
+        ++digits;
+      }
+    }
     for (std::size_t i = 0; i < curves.size(); ++i) {
       Curve& curve = curves[i];
-      curve.name = by ? shown_value(by_axis, *curve.by) : std::string();
+      curve.name = by ? shown_value(by_axis, *curve.by, digits) : std::string();
       curve.stroke = i;
       curve.mark = has_marks ? Curve::Mark::kLineAndMarks : Curve::Mark::kLine;
       if (are_coloured) {
@@ -423,15 +445,14 @@ class FigureBuilder {
       }
     }
     if (are_coloured) {
-      by_axis.range = {*curves.front().by, *curves.back().by};
+      by_axis.span({*curves.front().by, *curves.back().by});
       figure_.colours = by_axis;
     }
     panel_.curves = std::move(curves);
-    panel_.x.span(range_of(answer[0].numbers, panel_.x.is_logarithmic), has_marks ? 0.02 : 0.0);
-    panel_.y.span(range_of(answer[1].numbers, panel_.y.is_logarithmic), 0.05);
-    panel_.y.range = range_given(request_).value_or(panel_.y.range);
-    if (std::all_of(answer[1].numbers.begin(), answer[1].numbers.end(),
-                    [](double value) { return std::isnan(value); })) {
+    span(panel_.x, answer[0].numbers, has_marks ? 0.02 : 0.0);
+    span(panel_.y, answer[1].numbers, 0.05, range_given(request_));
+    if (std::none_of(answer[1].numbers.begin(), answer[1].numbers.end(),
+                     [&](double value) { return is_drawable(value, panel_.y.is_logarithmic); })) {
       note_empty("no point has a value");
     }
     if (gathered.gaps > 0) {
@@ -460,8 +481,8 @@ class FigureBuilder {
     auto answer = query(columns, condition_.sql);
     panel_.x = axis_for("--log-x", x, answer[0], request_.is_x_logarithmic);
     panel_.y = axis_for("--log-y", y, answer[1], request_.is_y_logarithmic);
-    panel_.x.span(range_of(answer[0].numbers, panel_.x.is_logarithmic), 0.03);
-    panel_.y.span(range_of(answer[1].numbers, panel_.y.is_logarithmic), 0.03);
+    span(panel_.x, answer[0].numbers, 0.03);
+    span(panel_.y, answer[1].numbers, 0.03);
     FigureAxis colour{.label = "points in a cell", .name = "points"};
     if (has_colour) {
       refuse_texts("--colour ", answer[2]);
@@ -533,7 +554,7 @@ class FigureBuilder {
         return !is_drawable(value, panel_.x.is_logarithmic) ||
                (range && (value < range->from || value > range->to));
       });
-      panel_.x.span(range.value_or(range_of(values, panel_.x.is_logarithmic)));
+      span(panel_.x, values, 0.0, range);
       panel_.bars = binned(values, panel_.x);
       panel_.x.range = {panel_.bars->edges.front(), panel_.bars->edges.back()};
     }
@@ -566,25 +587,10 @@ class FigureBuilder {
   Panel panel_ = {};
 };
 
-/// Throws InputError if --range reaches 0 on a logarithmic axis.
-void check_range(const PlotRequest& request) {
-  const bool has_colours = !request.map.empty() || !request.scatter.empty();
-  const auto [flag, is_logarithmic] =
-      has_colours              ? std::pair{"--log-colour", request.is_colour_logarithmic}
-      : !request.lines.empty() ? std::pair{"--log-y", request.is_y_logarithmic}
-                               : std::pair{"--log-x", request.is_x_logarithmic};
-  const auto range = range_given(request);
-  if (range && is_logarithmic && range->from <= 0.0) {
-    throw InputError(fmt::format("--range {} is not allowed with {}: FROM must be above 0",
-                                 request.range, flag));
-  }
-}
-
 }  // namespace
 
 Figure figure_of(Source& source, const StudyShape& shape, const PlotRequest& request,
                  const Tell& tell) {
-  check_range(request);
   return FigureBuilder(source, shape, request, tell).made();
 }
 

@@ -28,6 +28,7 @@
 #include "proto/text.h"
 #include "proto/wire/chunk.h"
 #include "server/maintenance/study_changes_offline.h"
+#include "server/query/columns.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/estimate.h"
 #include "worker/solver/model/errors.h"
@@ -136,36 +137,14 @@ PointSpec point_of(const std::string& study, std::uint64_t point,
           protocol::from_message(reply.model())};
 }
 
-/// Reads the point from the recipe in a database file. Throws as server::stored_recipe does, and
-/// std::runtime_error if the study does not have the point.
+/// Reads the point from a database file: from its row or, if it is not solved, from the recipe.
+/// Throws as server::stored_recipe and protocol::point_reply do.
 PointSpec point_in(const std::string& database, const protocol::StudyStatus& study,
-                   std::uint64_t point) {
-  const protocol::PointTable table(server::stored_recipe(database, study.study_id()));
-  if (point >= table.size()) {
-    throw std::runtime_error(fmt::format("the study \"{}\" has no point {}: its points are 0 to {}",
-                                         study.name(), point, table.size() - 1));
-  }
-  if (!table.passes_filter(point)) {
-    throw std::runtime_error(
-        fmt::format("point {} of the study \"{}\" is left out by its filter", point, study.name()));
-  }
-  if (const std::string fault = table.fault(point); !fault.empty()) {
-    throw std::runtime_error(fault);
-  }
-  const protocol::Point values = table.point(point);
-  return {{values.H_m, values.mu, values.e_star, table.wants_errors()},
-          study.name(),
-          point,
-          table.model(values.model)};
-}
-
-/// Requests the definition of the point from a server. The server does not solve the point.
-PointSpec point_at(Connection& connection, const std::string& study, std::uint64_t point) {
-  protocol::TraceRequest request;
-  request.set_study(study);
-  request.set_point(point);
-  request.set_only_point(true);
-  return point_of(study, point, connection.trace(std::move(request)));
+                   std::uint64_t point, const protocol::Table& row) {
+  auto reply = protocol::point_reply(
+      protocol::PointTable(server::stored_recipe(database, study.study_id())), point);
+  server::use_stored_inputs(row, reply);
+  return point_of(study.name(), point, reply);
 }
 
 /// Throws ConnectionError for an invalid trace, and ServerError for a trace that is too long.
@@ -237,9 +216,7 @@ SolvedAgain solve_by_worker(Console& console, Connection& connection, const std:
 /// The row of a point in the view `runs`, by column; empty if the point is not solved.
 using StoredRow = std::map<std::string, Value>;
 
-StoredRow stored_row(Source& source, const std::string& study, std::uint64_t point) {
-  const auto table = source.query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
-                                              server::sql_text(study), point));
+StoredRow by_column(const protocol::Table& table) {
   StoredRow row;
   for (std::size_t i = 0; !table.rows.empty() && i < table.columns.size(); ++i) {
     row.emplace(table.columns[i], table.rows[0].at(i));
@@ -388,17 +365,23 @@ SolvedAgain solve_again(Console& console, const PointSource& from, const std::st
         "URL");
   }
   const auto source = open_source(console, from.source);
+  const auto table = source->query(fmt::format("SELECT * FROM runs WHERE study = {} AND point = {}",
+                                               server::sql_text(study), point));
   std::optional<Connection> connection;
   std::optional<PointSpec> local;
   if (!database.empty()) {
-    local = point_in(database, study_named(*source, study), point);
+    local = point_in(database, study_named(*source, study), point, table);
   } else {
     connection.emplace(connection_settings(console, from.source));
     if (from.is_local) {
-      local = point_at(*connection, study, point);
+      protocol::TraceRequest request;
+      request.set_study(study);
+      request.set_point(point);
+      request.set_only_point(true);
+      local = point_of(study, point, connection->trace(std::move(request)));
     }
   }
-  const auto stored = stored_row(*source, study, point);
+  const auto stored = by_column(table);
   if (text_in(stored, "status") == "failed") {  // solving the point here may crash this process
     throw std::runtime_error(
         fmt::format("point {} of {} failed and has no trace: {}. `oblique retry {}` solves it "

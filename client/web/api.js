@@ -22,8 +22,7 @@ async function request(path, options) {
 
 export const json = async (path, signal) => (await request(path, { signal })).json();
 
-export const rowsPath = (study, query) =>
-  `/api/studies/${study}/rows?${new URLSearchParams(query)}`;
+export const rowsPath = (study, query) => `api/studies/${study}/rows?${new URLSearchParams(query)}`;
 
 export const rows = (study, query, signal) => json(rowsPath(study, query), signal);
 
@@ -45,7 +44,7 @@ export async function numbers(path, signal) {
   return { head, bytes, begin: 4 + length };
 }
 
-export const session = () => json("/api/session");
+export const session = () => json("api/session");
 
 /**
  * Receives the server's overview (studies and workers) again and again while the page is visible.
@@ -62,7 +61,7 @@ export function follow({ take, say, reconnected }) {
   const open = () => {
     if (document.hidden) close();
     if (document.hidden || source) return;
-    source = new EventSource("/api/events");
+    source = new EventSource("api/events");
     source.addEventListener("overview", (event) => take(JSON.parse(event.data)));
     source.addEventListener("open", () => {
       if (isSilent) reconnected();

@@ -183,7 +183,7 @@ export function newStudyView(root, place) {
 
   async function ask({ model, recipe }, signal) {
     try {
-      show(sizeOf(await post("/api/check", { model, recipe }, signal)));
+      show(sizeOf(await post("api/check", { model, recipe }, signal)));
     } catch (error) {
       if (signal.aborted) return;
       if (error.status === 400) show(error.message, true);
@@ -216,7 +216,7 @@ export function newStudyView(root, place) {
     if (isStarting || isWrong) return;
     isStarting = submit.disabled = true;
     try {
-      const made = await post("/api/studies", submissionOf(read()));
+      const made = await post("api/studies", submissionOf(read()));
       if (!place.signal.aborted) place.go(`#/study/${made.id}`);
     } catch (error) {
       said.textContent = error.message;

@@ -21,7 +21,7 @@ export function studyButtons({ id, name, state, failed }, say) {
   const change = async (what) => {
     if (what === "cancel" && !confirm(`Cancel ${name}? Solved points stay.`)) return;
     try {
-      const { study, retried } = await post(`/api/studies/${id}/${what}`);
+      const { study, retried } = await post(`api/studies/${id}/${what}`);
       say(
         `${study.name}: ${what === "retry" ? `${counted(retried, "point")} tried again` : study.state}`,
       );
@@ -118,7 +118,7 @@ function inOrder(studies, text) {
 async function readStudies(signal) {
   const found = new Map();
   for (let after = 0; found.size < mostRead;) {
-    const page = await json(`/api/studies?limit=${pageSize}&after=${after}`, signal);
+    const page = await json(`api/studies?limit=${pageSize}&after=${after}`, signal);
     for (const study of page.studies) found.set(study.id, study);
     after = page.next_after;
     if (after === 0) break;

@@ -527,6 +527,26 @@ std::string fault_of_inputs(const PointResult& result, const PointTable& table) 
   return has_model ? "" : "the worker solved it with another model than that of the study";
 }
 
+TraceReply point_reply(const PointTable& table, std::uint64_t point) {
+  const std::string fault = point >= table.size()
+                                ? fmt::format("the study has no point {}: its points are 0 to {}",
+                                              point, table.size() - 1)
+                            : !table.passes_filter(point)
+                                ? fmt::format("point {} is left out by the study's filter", point)
+                                : table.fault(point);
+  if (!fault.empty()) {
+    throw std::runtime_error(fault);
+  }
+  const Point values = table.point(point);
+  TraceReply reply;
+  *reply.mutable_model() = to_message(table.model(values.model));
+  reply.set_h_m(values.H_m);
+  reply.set_mu(values.mu);
+  reply.set_e_star(values.e_star);
+  reply.set_errors(table.wants_errors());
+  return reply;
+}
+
 Point inputs_of(const PointResult& result, const PointTable& table) {
   return result.has_h_m() ? Point{table.segment_at(result.point()).model, result.h_m(), result.mu(),
                                   result.e_star()}

@@ -138,6 +138,10 @@ void set_inputs(PointResult& result, const PointTable& table);
 /// text. The result of a failed point may have no inputs.
 std::string fault_of_inputs(const PointResult& result, const PointTable& table);
 
+/// Returns a reply with the inputs of a point and without a trace. Throws std::runtime_error if the
+/// study has no such point or a fault excludes it.
+TraceReply point_reply(const PointTable& table, std::uint64_t point);
+
 /// Returns the inputs of a result. If it has none, returns the inputs of its point in `table`.
 Point inputs_of(const PointResult& result, const PointTable& table);
 

@@ -9,6 +9,8 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
+#include "proto/recipe/point_table.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/parameters.h"
 #include "worker/solver/model/result_fields.h"
@@ -138,6 +140,27 @@ bool varies(const protocol::Recipe& recipe, std::string_view key) {
 
 std::string column_of_key(std::string_view key) {
   return key == "E" ? "E_Pa" : std::string(key);
+}
+
+void use_stored_inputs(const protocol::Table& row, protocol::TraceReply& inputs) {
+  const auto stored = [&row](const std::string& column, double own) {
+    const auto at = std::ranges::find(row.columns, column) - row.columns.begin();
+    const auto* const value =
+        row.rows.empty() || at == std::ssize(row.columns)
+            ? nullptr
+            : std::get_if<double>(&row.rows[0].at(static_cast<std::size_t>(at)));
+    return value != nullptr && protocol::is_close(*value, own) ? *value : own;
+  };
+  inputs.set_h_m(stored("H", inputs.h_m()));
+  inputs.set_mu(stored("mu", inputs.mu()));
+  inputs.set_e_star(stored("e", inputs.e_star()));
+  auto model = protocol::from_message_unchecked(inputs.model());
+  for (const auto& key : solver::model_keys()) {
+    if (const double own = key.get(model); stored(column_of_key(key.name), own) != own) {
+      key.set(model, stored(column_of_key(key.name), own));
+    }
+  }
+  *inputs.mutable_model() = protocol::to_message(model);
 }
 
 const std::vector<Column>& all_columns() {

@@ -32,6 +32,11 @@ const Column* find_column(std::string_view name);
 /// ignores case and e is another key.
 std::string column_of_key(std::string_view key);
 
+/// Replaces the inputs of a point, as this machine computes them from the recipe, by those of its
+/// row in `runs`, which a worker solved and which may differ in the last bits. `row` has no row if
+/// the point is not solved. Values that differ by more are those of a damaged row, and ignored.
+void use_stored_inputs(const protocol::Table& row, protocol::TraceReply& inputs);
+
 /// Returns everything that a query may name: all columns, elements of lists, and functions.
 std::vector<Column> columns_and_functions();
 

@@ -9,7 +9,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/frames.h"
+#include "proto/wire/chunk.h"
 #include "proto/wire/frame_scan.h"
+#include "server/query/columns.h"
 #include "server/study/limits.h"
 
 namespace oblique::server {
@@ -217,6 +219,18 @@ void ClientHandler::end_query(const Client& client, std::uint64_t request_id) {
 void ClientHandler::query_report(QueryReport report) {
   const auto found = pending_.find(report.ticket);
   if (found == pending_.end()) {
+    return;
+  }
+  if (found->second.trace) {
+    protocol::ClientReply answer;
+    protocol::Table row;
+    if (answer.ParseFromString(report.reply) && protocol::is_sound(answer.query())) {
+      protocol::append_rows(answer.query(), row);
+      use_stored_inputs(row, found->second.trace->reply);
+    }
+    if (report.kind == QueryReport::Kind::kAnswered) {
+      inputs_found(found);
+    }
     return;
   }
   Pending& query = found->second;

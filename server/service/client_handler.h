@@ -60,6 +60,7 @@ class ClientHandler {
   /// A trace that a worker solves in addition to its batches.
   struct TraceJob {
     bool only_point;
+    std::uint64_t point;
     std::int64_t deadline_ms;
     protocol::TraceOrder order{};
     protocol::TraceReply reply{};      ///< all fields except the trace
@@ -107,6 +108,7 @@ class ClientHandler {
   static protocol::ClientReply find_point(const StudyTable& study, bool is_table_made,
                                           std::uint64_t point);
   void point_found(std::uint64_t ticket, protocol::ClientReply found);
+  void inputs_found(PendingRequests::iterator request);
   void dispatch_traces();
   std::optional<WorkerId> free_worker(const TraceJob& job) const;
   protocol::ClientReply trace_reply(TraceJob& job, const WorkerRecord& worker,

@@ -1,4 +1,4 @@
-// Handles requests for traces: computes the point's inputs and chooses a worker.
+// Handles requests for traces: finds the point's inputs and chooses a worker.
 
 #include <algorithm>
 #include <cstddef>
@@ -52,8 +52,9 @@ void ClientHandler::trace(const Client& client, const protocol::TraceRequest& re
                            ? limits::kTraceTime_ms
                            : static_cast<std::int64_t>(std::min<std::uint64_t>(
                                  request.time_limit_ms(), limits::kLongestTraceTime_ms));
-  TraceJob& job = add(ticket, client, now)
-                      .trace.emplace(TraceJob{request.only_point(), now.steady_ms + time_ms});
+  TraceJob& job =
+      add(ticket, client, now)
+          .trace.emplace(TraceJob{request.only_point(), request.point(), now.steady_ms + time_ms});
   job.reply.set_study_id(*known);
   job.order.set_trace_id(ticket);
   job.order.set_shape(request.shape());
@@ -81,23 +82,8 @@ protocol::ClientReply ClientHandler::find_point(const StudyTable& study, bool is
     // If the study has no table, makes a separate one, because this may be the check thread.
     const auto table =
         is_table_made ? study.get() : StudyTable(study.recipe_bytes(), study.size()).get();
-    const std::string error = point >= table->size()
-                                  ? fmt::format("the study has no point {}: its points are 0 to {}",
-                                                point, table->size() - 1)
-                              : !table->passes_filter(point)
-                                  ? fmt::format("point {} is left out by the study's filter", point)
-                                  : table->fault(point);
-    if (!error.empty()) {
-      return error_reply(error);
-    }
     protocol::ClientReply reply;
-    protocol::TraceReply& fields = *reply.mutable_trace();
-    const protocol::Point values = table->point(point);
-    *fields.mutable_model() = protocol::to_message(table->model(values.model));
-    fields.set_h_m(values.H_m);
-    fields.set_mu(values.mu);
-    fields.set_e_star(values.e_star);
-    fields.set_errors(table->wants_errors());
+    *reply.mutable_trace() = protocol::point_reply(*table, point);
     return reply;
   } catch (const std::exception& error) {
     return error_reply(error.what());
@@ -110,18 +96,33 @@ void ClientHandler::point_found(std::uint64_t ticket, protocol::ClientReply foun
     return;  // the client has disconnected
   }
   TraceJob& job = *request->second.trace;
-  if (found.has_error() || job.only_point) {
-    if (found.has_trace()) {
-      found.mutable_trace()->set_study_id(job.reply.study_id());
-    }
-    core_.ports.reply(request->second.client, std::move(found));
+  if (found.has_error()) {
+    refuse(request, found.error().message());
+    return;
+  }
+  const StudyId study = job.reply.study_id();
+  job.reply.MergeFrom(found.trace());
+  protocol::QueryRequest row;
+  row.set_sql(
+      fmt::format("SELECT * FROM runs WHERE study_id = {} AND point = {}", study, job.point));
+  const bool has_rows = core_.states.contains(study) && core_.scheduler.study(study).completed > 0;
+  if (!has_rows || !core_.ports.query({ticket, request->second.client.share(), row})) {
+    inputs_found(request);
+  }
+}
+
+void ClientHandler::inputs_found(PendingRequests::iterator request) {
+  TraceJob& job = *request->second.trace;
+  if (job.only_point) {
+    protocol::ClientReply reply;
+    *reply.mutable_trace() = std::move(job.reply);
+    core_.ports.reply(request->second.client, std::move(reply));
     pending_.erase(request);
   } else if (core_.workers.all().empty()) {
     refuse(request,
            "no worker is connected: start an `oblique-worker`, or solve the trace here "
            "with `oblique trace --local`");
   } else {
-    job.reply.MergeFrom(found.trace());
     *job.order.mutable_model() = job.reply.model();
     job.order.set_h_m(job.reply.h_m());
     job.order.set_mu(job.reply.mu());

@@ -2,7 +2,7 @@
 import { ink } from "./colours.js";
 import { h } from "./dom.js";
 import { shown } from "./format.js";
-import { scale, ticks, tickText } from "./scale.js";
+import { baseOf, baseText, countAsOne, scale, ticks, tickText } from "./scale.js";
 
 /**
  * A chart of lines or bars. Its contents, in shown units: title; x {label, name, unit, values,
@@ -55,12 +55,13 @@ const formOf = ({ title, x, y, series, isBars, spans }) =>
 function endsOfAxis({ values, ends }, least, most) {
   const isAll = least === values[0] && most === values[values.length - 1];
   const [from, to] = isAll && ends ? ends : [least, most];
-  if (to > from) return [from, to];
+  if (!countAsOne(from, to)) return [from, to];
   const room = Math.abs(from) * 0.05 || 0.5;
   return [from - room, to + room];
 }
 
 function axesOf({ x, y }, height) {
+  const baseIn = ({ scales }, i) => baseOf(scales["xy"[i]].min, scales["xy"[i]].max);
   const axis = {
     stroke: ink("text"),
     grid: { stroke: ink("grid"), width: 1 },
@@ -69,20 +70,19 @@ function axesOf({ x, y }, height) {
     labelFont: "13px system-ui, sans-serif",
     labelSize: 22,
     filter: (_, splits) => splits,
-    values: (_, splits) => splits.map(tickText),
+    values: (plot, splits, i) => splits.map((one) => tickText(one, baseIn(plot, i))),
+    label: (plot, i) => [x, y][i].label + baseText(baseIn(plot, i)),
   };
   const across = (plot) => plot.bbox.width / (window.devicePixelRatio || 1) / 80;
   return [
     {
       ...axis,
-      label: x.label,
       size: 34,
       splits: (plot, _, least, most) =>
         ticks(scale(least, most, x.isLog), Math.max(across(plot), 2)),
     },
     {
       ...axis,
-      label: y.label,
       size: 62,
       splits: (_, __, least, most) => ticks(scale(least, most, y.isLog), Math.max(height / 50, 2)),
     },

@@ -27,24 +27,42 @@ export function endsOf(values) {
   return least <= most ? [least, most] : [null, null];
 }
 
+/** Whether all values in a range count as one, because they differ by rounding at most. */
+export const countAsOne = (from, to) =>
+  !(to - from > Math.max(1e-12 * Math.max(Math.abs(from), Math.abs(to)), 1e-300));
+
+/**
+ * Returns the round number that is subtracted from the ticks of a range; 0 unless the ticks would
+ * need more than about six digits.
+ */
+export function baseOf(from, to) {
+  const [size, width] = [Math.max(Math.abs(from), Math.abs(to)), to - from];
+  if (countAsOne(from, to) || width > 1e-4 * size) return 0;
+  const digits = Math.floor(Math.log10(size)) - Math.floor(Math.log10(1.01 * width));
+  return Number(((from + to) / 2).toPrecision(digits));
+}
+
+/** Formats the number of baseOf for the label of an axis. */
+export const baseText = (base) =>
+  base === 0 ? "" : ` ${base > 0 ? "\u2212" : "+"} ${tickText(Math.abs(base))}`;
+
 /** Returns about `wanted` round values within a range. */
 export function ticks({ from, to, isLog }, wanted) {
   const [least, most] = [Math.min(from, to), Math.max(from, to)];
   const width = most - least;
   // In a range of a few ulps, adding a step would not change the value and the loop would not end.
-  if (!(width < Infinity && width > 1e-12 * Math.max(Math.abs(least), Math.abs(most))))
-    return [least];
+  if (!(width < Infinity) || countAsOne(least, most)) return [least];
   if (isLog && most / least >= 8) return logTicks(least, most, wanted);
   const rough = width / Math.max(wanted, 1);
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].find((digit) => digit * power >= rough * 0.67) * power;
   const first = Math.ceil(least / step - 1e-9);
   const number = Math.floor(most / step + 1e-9) - first + 1;
-  return Array.from({ length: number }, (_, i) => Number(((first + i) * step).toPrecision(12)));
+  return Array.from({ length: number }, (_, i) => Number(((first + i) * step).toPrecision(15)));
 }
 
 function logTicks(least, most, wanted) {
-  const decades = Math.log10(most / least);
+  const decades = Math.log10(most) - Math.log10(least);
   const digits = decades > wanted ? [1] : decades > wanted / 3 ? [1, 3] : [1, 2, 5];
   const step = Math.max(1, Math.round(decades / wanted));
   const found = [];
@@ -54,12 +72,12 @@ function logTicks(least, most, wanted) {
   return found.filter((value) => value >= least * (1 - 1e-9) && value <= most * (1 + 1e-9));
 }
 
-export function tickText(value) {
-  const size = Math.abs(value);
-  const isLong = value !== 0 && (size >= 1e5 || size < 1e-3);
-  const text = isLong
-    ? value.toExponential().replace("e+", "e")
-    : String(Number(value.toPrecision(12)));
+/** Formats the difference of a value from the number of baseOf. */
+export function tickText(value, base = 0) {
+  const shown = Number((value - base).toPrecision(base === 0 ? 7 : 3));
+  const size = Math.abs(shown);
+  const isLong = shown !== 0 && (size >= 1e5 || size < 1e-3);
+  const text = isLong ? shown.toExponential().replace("e+", "e") : String(shown);
   return text.replaceAll("-", "\u2212");
 }
 

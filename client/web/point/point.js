@@ -47,7 +47,7 @@ function textOf(value, { name, unit }) {
 async function readPoint(study, point, signal) {
   const select = study.columns.map((column) => column.name).join(",");
   const [update, answer] = await Promise.all([
-    json(`/api/studies/${study.id}/points/${point}`, signal),
+    json(`api/studies/${study.id}/points/${point}`, signal),
     rows(study.id, { select, where: `point = ${point}` }, signal),
   ]);
   const values = answer.rows[0];
@@ -201,7 +201,7 @@ function commandsOf(study, point, file) {
 
 export async function pointView(root, place, id, point) {
   const { signal } = place;
-  const study = await json(`/api/studies/${id}`, signal);
+  const study = await json(`api/studies/${id}`, signal);
   const back = h("a", { href: place.last(`/study/${id}`) }, study.name);
   place.trail([back, `point ${count(point)}`]);
   let update = await readPoint(study, point, signal);

@@ -11,7 +11,7 @@ export async function loadTrace(study, point, signal, say) {
   say("Waiting for a worker to solve the point again.");
   for (;;) {
     try {
-      return parse(await numbers(`/api/studies/${study}/points/${point}/trace?shape=1`, signal));
+      return parse(await numbers(`api/studies/${study}/points/${point}/trace?shape=1`, signal));
     } catch (error) {
       if (signal.aborted || !isTemporary(error)) throw error;
       say(`No time histories yet: ${error.message.replace(/\.$/, "")}. Trying again.`, true);

@@ -12,6 +12,10 @@ export function joined(...conditions) {
 export const within = (column, from = "", to = "") =>
   joined(from === "" ? "" : `${column} >= ${from}`, to === "" ? "" : `${column} <= ${to}`);
 
+/** Returns the condition for one value of a column; a worker's value may differ in the last bits. */
+const equals = (column, value, margin = 1e-12 * Math.abs(value)) =>
+  `${column} BETWEEN ${value - margin} AND ${value + margin}`;
+
 /** Returns a number between a and b with as few digits as possible. */
 function shortBetween(a, b) {
   const [least, most] = [Math.min(a, b), Math.max(a, b)];
@@ -64,7 +68,7 @@ function partOf(side, range) {
     return within(column, ...range.map((end) => rounded(end, width)));
   }
   const sorted = Array.from(side.values).sort((a, b) => a - b);
-  if (sorted.length < 2) return side.isWhole ? "" : `${column} = ${sorted[0]}`;
+  if (sorted.length < 2) return side.isWhole ? "" : equals(column, sorted[0]);
   const inside = valuesIn(side, range);
   if (inside.length === sorted.length && side.isWhole) return "";
   const [first, last] = [sorted.indexOf(inside[0]), sorted.indexOf(inside.at(-1))];
@@ -85,7 +89,7 @@ export function shownPart(side, isZoomed) {
 /** Returns the conditions that hold for the whole picture: values of other axes, and its block. */
 function heldPart(blocks, { head }) {
   const varied = (head.at ?? []).filter((one) => one.of > 1);
-  const held = varied.map((one) => `${columnOfAxis(one.key)} = ${one.value}`);
+  const held = varied.map((one) => equals(columnOfAxis(one.key), one.value));
   const { first_point: first, points } = blocks[head.block] ?? {};
   const isOfBlock = points && blocks.length > 1;
   return joined(...held, isOfBlock ? `point >= ${first} AND point < ${first + points}` : "");
@@ -94,7 +98,8 @@ function heldPart(blocks, { head }) {
 /** Returns the condition for the shown lines and, if given, a range of their output. */
 function linesPart({ y, z, least, most }, range) {
   const isSome = y.name && !y.isWhole;
-  const lines = isSome ? `${columnOfAxis(y.name)} IN (${Array.from(y.values).join(", ")})` : "";
+  const line = (value) => equals(columnOfAxis(y.name), value);
+  const lines = isSome ? Array.from(y.values, line).join(" OR ") : "";
   const width = (most ?? 1) - (least ?? 0);
   return joined(lines, range ? within(z.name, ...range.map((end) => rounded(end, width))) : "");
 }

@@ -1,8 +1,8 @@
 // Legends of pictures: a colour bar or a list of categories, and the kinds of empty cells.
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
-import { count, counted, heading, withUnit } from "../lib/format.js";
-import { scale } from "../lib/scale.js";
+import { count, counted, heading, shownUnit, withUnit } from "../lib/format.js";
+import { baseOf, baseText, scale } from "../lib/scale.js";
 import { drawTicksBelow } from "./map.js";
 
 const barHeight = 44;
@@ -56,9 +56,11 @@ function drawBar(canvas, z, { from, to, zLog }) {
 
 function colourBar({ z }, look) {
   const ends = [look.from, look.to].map((end) => withUnit(end, z.name, z.unit)).join(" to ");
+  const [, factor] = shownUnit(z.name, z.unit);
+  const base = baseText(baseOf(look.from * factor, look.to * factor));
   const canvas = h("canvas", { role: "img", "aria-label": `Colours of ${z.name}, from ${ends}` });
   new ResizeObserver(() => drawBar(canvas, z, look)).observe(canvas);
-  return h("div.bar", h("p", heading(z.name, z.unit)), canvas);
+  return h("div.bar", h("p", heading(z.name, z.unit) + base), canvas);
 }
 
 /** Creates a sample of a pattern. */

@@ -3,7 +3,7 @@
 import * as colours from "../lib/colours.js";
 import { h } from "../lib/dom.js";
 import { heading, shownUnit } from "../lib/format.js";
-import { scale, ticks, tickText } from "../lib/scale.js";
+import { baseOf, baseText, scale, ticks, tickText } from "../lib/scale.js";
 import { emptyKinds } from "./picture.js";
 
 const margin = { left: 64, right: 14, top: 10, bottom: 46 };
@@ -50,16 +50,17 @@ function reachOf({ order, edges, scale: { place } }, i) {
   return [place(edges[k]), place(edges[k + 1])];
 }
 
-/** Draws ticks below an area, with values where they fit. */
+/** Draws ticks below an area, with values where they fit; returns what their label must add. */
 export function drawTicksBelow(context, area, of, { name, unit }, most) {
   const [, factor] = shownUnit(name, unit);
   context.font = "12px system-ui, sans-serif";
   context.textAlign = "center";
   context.textBaseline = "top";
+  const base = baseOf(of.from * factor, of.to * factor);
   let right = -Infinity;
   for (const value of ticks(of, Math.max(area.w / 80, 2))) {
     const x = area.x + of.place(value) * area.w;
-    const text = tickText(Number((value * factor).toPrecision(5)));
+    const text = tickText(value * factor, base);
     const half = context.measureText(text).width / 2;
     context.fillRect(x - 0.5, area.y + area.h, 1, 5);
     const at = Math.min(Math.max(x, half), most - half);
@@ -67,6 +68,7 @@ export function drawTicksBelow(context, area, of, { name, unit }, most) {
     context.fillText(text, at, area.y + area.h + 8);
     right = at + half;
   }
+  return baseText(base);
 }
 
 function drawAxes(context, area, { x, y }, cells) {
@@ -76,24 +78,25 @@ function drawAxes(context, area, { x, y }, cells) {
   context.lineWidth = 1;
   context.strokeRect(area.x - 0.5, area.y - 0.5, area.w + 1, area.h + 1);
   const foot = area.y + area.h;
-  drawTicksBelow(context, area, cells.x.scale, x, area.x + area.w + margin.right);
+  const xBase = drawTicksBelow(context, area, cells.x.scale, x, area.x + area.w + margin.right);
   const [, factor] = shownUnit(y.name, y.unit);
   context.textAlign = "right";
   context.textBaseline = "middle";
+  const yBase = baseOf(cells.y.scale.from * factor, cells.y.scale.to * factor);
   for (const value of ticks(cells.y.scale, Math.max(area.h / 45, 2))) {
     const at = foot - cells.y.scale.place(value) * area.h;
     context.fillRect(area.x - 5, at - 0.5, 5, 1);
-    context.fillText(tickText(value * factor), area.x - 8, at);
+    context.fillText(tickText(value * factor, yBase), area.x - 8, at);
   }
   context.textAlign = "center";
   context.textBaseline = "bottom";
   context.font = "13px system-ui, sans-serif";
-  context.fillText(heading(x.name, x.unit), area.x + area.w / 2, foot + margin.bottom - 2);
+  context.fillText(heading(x.name, x.unit) + xBase, area.x + area.w / 2, foot + margin.bottom - 2);
   context.save();
   context.translate(2, area.y + area.h / 2);
   context.rotate(-Math.PI / 2);
   context.textBaseline = "top";
-  context.fillText(heading(y.name, y.unit), 0, 0);
+  context.fillText(heading(y.name, y.unit) + baseText(yBase), 0, 0);
   context.restore();
 }
 

@@ -1,6 +1,6 @@
 // Reads the data of a picture: slices, bins, single points and medians, all in one form.
 import { numbers, rows } from "../api.js";
-import { endsOf, quantile, scale } from "../lib/scale.js";
+import { countAsOne, endsOf, quantile, scale } from "../lib/scale.js";
 import { joined, within } from "./conditions.js";
 import { ownAxes } from "./fields.js";
 
@@ -25,7 +25,7 @@ const mostBins = 96;
 const mostForMedians = 100_000;
 
 const ask = (study, kind, query, signal) =>
-  numbers(`/api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
+  numbers(`api/studies/${study}/${kind}?${new URLSearchParams(query)}`, signal);
 
 /** Returns the axis indices of the values in an answer: `shown`, evenly from `first` to `last`. */
 function numbersOf({ first, last }, shown) {
@@ -74,7 +74,7 @@ async function slice(view, query, signal) {
 
 /** Creates a picture axis of equal bins, or of one bin around a single value. */
 function binSide(name, unit, least, most, bins, isLog) {
-  if (!(most > least)) {
+  if (countAsOne(least, most)) {
     const half = Math.abs(least) * 0.05 || 0.5;
     return {
       name,

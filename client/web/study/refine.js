@@ -71,7 +71,7 @@ export function refineRow(view) {
     try {
       const axes = { axes: finerAxes(view), ...(block.where ? { where: block.where } : {}) };
       const recipe = { errors: study.errors, model: modelOf(study.model), blocks: [axes] };
-      const made = await post("/api/studies", { name: name.value.trim(), recipe });
+      const made = await post("api/studies", { name: name.value.trim(), recipe });
       const kept = ["z", "x", "y", "xlog", "ylog", "zlog", "from", "to"]
         .map((one) => [one, view.field(one)])
         .filter(([, value]) => value !== "");

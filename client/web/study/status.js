@@ -120,7 +120,7 @@ export function statusRow(view, moved) {
 
   async function ask() {
     askedAt = performance.now();
-    const page = await json(`/api/studies?limit=1&after=${study.id - 1}`, place.signal).catch(
+    const page = await json(`api/studies?limit=1&after=${study.id - 1}`, place.signal).catch(
       () => null,
     );
     const update = page?.studies[0];

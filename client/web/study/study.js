@@ -28,7 +28,7 @@ function looksOf(study, column) {
 }
 
 export async function studyView(root, place, id) {
-  const study = await json(`/api/studies/${id}`, place.signal);
+  const study = await json(`api/studies/${id}`, place.signal);
   place.trail([study.name]);
   return new StudyView(root, place, study);
 }

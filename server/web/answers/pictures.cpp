@@ -402,7 +402,7 @@ struct BinSide {
       throw std::invalid_argument(fmt::format(
           "{0}0 must be at most {0}1, and above 0 where the scale is logarithmic", name));
     }
-    bins = most > least ? bins : 1;
+    bins = most - least > kEndTolerance * std::max(std::abs(least), std::abs(most)) ? bins : 1;
   }
   ordered_json json() const {
     return {{"column", column.name}, {"unit", column.unit}, {"least", least},

@@ -125,8 +125,7 @@ HttpServer::HttpServer(const HttpAddress& address, OwnNames names, const HttpLim
       MHD_OPTION_NOTIFY_COMPLETED, static_cast<MHD_RequestCompletedCallback>(on_completed), nullptr,
       MHD_OPTION_NOTIFY_CONNECTION, &HttpServer::on_connection, this,
       MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits.bytes_of_connection, MHD_OPTION_CONNECTION_LIMIT,
-      limits.connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits.connections_of_one_address,
-      MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(limits.idle.count()),
+      limits.connections, MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(limits.idle.count()),
       MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
   if (daemon_ == nullptr) {
     throw std::runtime_error("the HTTP server cannot start");
@@ -154,7 +153,8 @@ void HttpServer::wake() {
 }
 
 /// Starts or ends the time limit of a connection. The idle time of libmicrohttpd begins again at
-/// each byte, so a slow peer could stay for ever.
+/// each byte, so a slow peer could stay for ever. The last free connection is freed again at once:
+/// the other transfer that is due first, usually the oldest request without a whole head, ends.
 void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*context*/,
                                MHD_ConnectionNotificationCode what) {
   auto& server = *static_cast<HttpServer*>(self);
@@ -167,7 +167,16 @@ void HttpServer::on_connection(void* self, MHD_Connection* connection, void** /*
   const int socket =
       MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
   try {
-    server.transfers_.insert_or_assign(connection, Transfer{socket, due});
+    const auto own = server.transfers_.insert_or_assign(connection, Transfer{socket, due}).first;
+    Transfer* first = nullptr;
+    for (auto at = server.transfers_.begin(); at != server.transfers_.end(); ++at) {
+      const bool is_sooner = at->second.due < (first == nullptr ? Time::max() : first->due);
+      first = at != own && is_sooner ? &at->second : first;
+    }
+    if (first != nullptr && server.transfers_.size() >= server.limits_.connections) {
+      first->due = Time::max();
+      ::shutdown(first->socket, SHUT_RDWR);  // makes libmicrohttpd close the connection
+    }
   } catch (const std::exception&) {
     ::shutdown(socket, SHUT_RDWR);  // no memory is left, so the connection ends
   }

@@ -20,8 +20,7 @@ namespace oblique::server {
 
 /// Limits on resources that HTTP peers can use. Each connection serves one request.
 struct HttpLimits {
-  unsigned connections = 256;                ///< further connections wait to be accepted
-  unsigned connections_of_one_address = 64;  ///< further connections are closed
+  unsigned connections = 256;  ///< the last one ends an older transfer, so that one is free
   unsigned streams = 32;
   /// Memory of a connection for the request line, its headers and the headers of the answer.
   std::size_t bytes_of_connection = std::size_t{16} * 1024;

@@ -92,8 +92,10 @@ std::optional<HttpAnswer> refuse(const HttpRequest& request, const OwnNames& own
   if (request.has_zero_bytes) {
     return text_answer(MHD_HTTP_BAD_REQUEST, "fields of a request must not contain zero bytes");
   }
-  const std::set<std::string> own_origins =
-      hosts.empty() ? std::set<std::string>() : std::set{"http://" + hosts.front()};
+  // Proxies name the browser's host in X-Forwarded-Host, which a page of another site cannot send.
+  const std::string forwarded = request.header("x-forwarded-host");
+  const std::set<std::string> own_origins{"http://" + request.header("host"), "http://" + forwarded,
+                                          "https://" + forwarded};
   const bool is_from_here =
       all_are(origins, own_origins) && all_are(sites, {"same-origin", "none"});
   if (!is_from_here && !is_followed_link(request)) {

@@ -45,15 +45,20 @@ std::optional<StudyPath> parse_study_path(const std::string& path) {
   return parsed;
 }
 
-struct PathChange {
-  std::uint64_t study;
-  protocol::StudyChange change;
-};
-
-std::optional<PathChange> parse_change(const std::string& path) {
+std::optional<std::pair<std::uint64_t, protocol::StudyChange>> parse_change(
+    const std::string& path) {
   const auto parsed = parse_study_path(path);
   const auto change = parsed && !parsed->point ? study_change(parsed->part) : std::nullopt;
-  return change ? std::optional(PathChange{parsed->study, *change}) : std::nullopt;
+  return change ? std::optional(std::pair(parsed->study, *change)) : std::nullopt;
+}
+
+/// Returns whether an Accept-Encoding of the request names gzip without q=0.
+bool accepts_gzip(const HttpRequest& request) {
+  static const std::regex kGzip(R"(.*\bgzip\s*(?!\s*;\s*q=0(\.0*)?\s*(,|$))(;.*|,.*|$))",
+                                std::regex::icase);
+  const auto codings = request.all("accept-encoding");
+  return std::ranges::any_of(codings,
+                             [](const std::string& text) { return std::regex_match(text, kGzip); });
 }
 
 /// Returns the file at the request's path (/ is the page), or 304 if the browser has the file
@@ -72,11 +77,14 @@ std::optional<HttpAnswer> file_answer(const HttpRequest& request) {
                     {},
                     {{"ETag", std::string(file->tag)},
                      {"Cache-Control", "no-cache"},
-                     {"Content-Encoding", "gzip"}}};
+                     {"Vary", "Accept-Encoding"}}};
   if (request.header("if-none-match").find(file->tag) != std::string::npos) {
     answer.status = MHD_HTTP_NOT_MODIFIED;
-  } else {
+  } else if (accepts_gzip(request)) {
+    answer.headers.emplace_back("Content-Encoding", "gzip");
     answer.body.assign(file->gzipped.begin(), file->gzipped.end());
+  } else {
+    answer.body.assign(file->plain.begin(), file->plain.end());
   }
   return answer;
 }
@@ -111,7 +119,7 @@ HttpAnswer Page::enter(const HttpRequest& request) const {
                        "starts");
   }
   HttpAnswer answer = text_answer(MHD_HTTP_SEE_OTHER, "");
-  answer.headers = {{"Location", "/"}, {"Set-Cookie", token().cookie_for(request.header("host"))}};
+  answer.headers = {{"Location", "./"}, {"Set-Cookie", token().cookie_for(request.header("host"))}};
   return answer;
 }
 
@@ -193,7 +201,7 @@ std::optional<HttpOutcome> Page::change(const HttpRequest& request) {
     return check_answer(request.body);
   }
   const auto change = parse_change(request.path);
-  return change ? std::optional<HttpOutcome>(change_study(service_, change->study, change->change))
+  return change ? std::optional<HttpOutcome>(change_study(service_, change->first, change->second))
                 : std::nullopt;
 }
 

@@ -19,6 +19,7 @@ struct PageFile {
   std::string_view path;  ///< such as /overview.js
   std::string_view content_type;
   std::string_view tag;  ///< ETag, with its quotes
+  std::span<const unsigned char> plain;
   std::span<const unsigned char> gzipped;
 };
 

@@ -96,7 +96,7 @@ bool PageToken::is(std::string_view text) const {
 }
 
 std::string PageToken::cookie_for(const std::string& host) const {
-  return cookie_name(host) + "=" + cookie_ + "; Path=/; HttpOnly; SameSite=Strict";
+  return cookie_name(host) + "=" + cookie_ + "; HttpOnly; SameSite=Strict";
 }
 
 bool PageToken::is_in(const std::vector<std::string>& cookies, const std::string& host) const {

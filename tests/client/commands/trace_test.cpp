@@ -1,5 +1,6 @@
 // `oblique trace` solves a point again, in its own process or on a worker, and reports errors.
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <fstream>
 #include <map>
@@ -8,9 +9,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
 #include "client/study/study_file.h"
+#include "server/database/sqlite.h"
 #include "server/store/store.h"
 #include "tests/client/study/fake_reach.h"
 #include "tests/support/points.h"
@@ -94,6 +97,19 @@ TEST_F(TraceCommand, APointSolvedAgainEqualsTheStoredPoint) {
   EXPECT_EQ(all["result"]["mu"], 2.0);
   EXPECT_EQ(all["trace"]["t_s"][0], 0.0);
   EXPECT_EQ(all["trace"]["node6y_m"].size(), all["trace"]["state"].size());
+}
+
+TEST_F(TraceCommand, UsesTheInputsOfTheStoredRow) {
+  solve_study("steps");
+  // A worker whose mathematics rounds differently has solved this mu.
+  const double solved = std::nextafter(1.2, 2.0);
+  const auto database =
+      server::open_database((folder_.path() / "oblique.db").string(), SQLITE_OPEN_READWRITE);
+  server::execute(database.get(),
+                  fmt::format("UPDATE results SET mu = {:.17g} WHERE point = 1", solved));
+  const auto json = run({"trace", "steps", "1", "--format", "json"});
+  EXPECT_EQ(json.exit_code, 0) << json.err;
+  EXPECT_EQ(nlohmann::json::parse(json.out)["result"]["mu"], solved);
 }
 
 TEST_F(TraceCommand, WritesTheSameRowsAsSolve) {

@@ -151,5 +151,15 @@ TEST(GatheredLines, UseTheMeanOfPointsWithTheSameX) {
   EXPECT_EQ(gathered.most_at_a_place, 2U);
 }
 
+TEST(GatheredLines, MergeValuesThatDifferByRoundingAndHaveNoGapBesideThem) {
+  const double after_2 = std::nextafter(2.0, 3.0);
+  const Answer answer{numbers({1, after_2, 3, 1, 2}), numbers({10, 20, 30, 1, 2}),
+                      numbers({0.5, std::nextafter(0.5, 1.0), 0.5, 1, 1})};
+  const auto gathered = gathered_lines(answer, {1, 2, 3});
+  ASSERT_EQ(gathered.curves.size(), 2U);
+  EXPECT_THAT(gathered.curves[0].y, ElementsAre(10, 20, 30));
+  EXPECT_EQ(gathered.gaps, 0U);
+}
+
 }  // namespace
 }  // namespace oblique::client::plot

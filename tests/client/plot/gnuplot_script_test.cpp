@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
 #include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -135,8 +137,113 @@ TEST(GnuplotScript, HasUnitsAndLogarithmicAxesWithSeveralTicks) {
   EXPECT_THAT(text, HasSubstr("set ylabel 'duration of contact [\u00b5s]' noenhanced"));
   EXPECT_THAT(
       text,
-      HasSubstr("set logscale x\nset xtics ()\ndo for [power=-9:9] { do for [digit in '1 2 5']"));
+      HasSubstr("set logscale x\nset xtics ()\ndo for [power=-2:0] { do for [digit in '1 2 5']"));
   EXPECT_THAT(text, HasSubstr("set yrange [0:500]"));
+}
+
+/// Returns the numbers that gnuplot writes below the horizontal axis of a line over `range`.
+std::vector<std::string> numbers_below(const Range& range, bool is_logarithmic) {
+  Figure figure = test::lines_of(1, 5);
+  Panel& panel = figure.panels[0];
+  panel.x.is_logarithmic = is_logarithmic;
+  panel.x.range = range;
+  panel.curves[0].x = {range.from, range.to};
+  panel.curves[0].y = {0.0, 1.0};
+  const auto text = output_of_gnuplot(script_for_terminal(figure, 80, 24, false));
+  // The numbers are in the line above that of the label.
+  std::vector<std::string> lines;
+  std::istringstream all(text);
+  for (std::string line; std::getline(all, line);) {
+    if (line.find("coefficient of friction") != std::string::npos) {
+      break;
+    }
+    lines.push_back(line);
+  }
+  std::istringstream words(lines.back());
+  return {std::istream_iterator<std::string>(words), {}};
+}
+
+TEST(GnuplotScript, MarksALogarithmicAxisOfAnyRangeWithSeveralDifferentNumbers) {
+  if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
+  }
+  for (const double from : {1e-300, 3e-14, 0.011, 1.0, 6.1e10, 2.1e7, 1e200}) {
+    for (const double ratio :
+         {1.0 + 1e-9, 1.001, 1.05, 1.38, 3.3, 7.8, 12.0, 99.0, 450.0, 2e4, 1e40, 1e95}) {
+      SCOPED_TRACE(testing::Message() << from << " times " << ratio);
+      const auto numbers = numbers_below({from, from * ratio}, true);
+      EXPECT_GE(std::set<std::string>(numbers.begin(), numbers.end()).size(), 2U);
+      EXPECT_LE(numbers.size(), 13U);
+    }
+  }
+}
+
+TEST(GnuplotScript, DrawsRangesOfAnyWidthAndSizeInEveryKindOfPicture) {
+  if (std::system("command -v gnuplot > /dev/null 2>&1") != 0) {
+    GTEST_SKIP() << "gnuplot is not installed (Debian: gnuplot-nox)";
+  }
+  for (const double value : {0.0, 1.0, -0.3, 1e9, 5e-324, 1e300}) {
+    for (const double spread : {0.0, 4e-16, 1e-12, 3e-12, 1e-10, 1e-8, 1e-6}) {
+      SCOPED_TRACE(testing::Message() << value << " and a spread of " << spread);
+      std::vector<double> values;
+      for (double i = 0.0; i < 5.0; ++i) {
+        values.push_back(value * (1.0 + spread * i));
+      }
+      Panel panel = test::panel_over_mu_and_H();
+      panel.x.span(range_of(values));
+      panel.y.span(range_of(values), 0.05);
+      Figure lines = test::figure_with(panel);
+      lines.panels[0].curves = {{.name = "a", .x = values, .y = values, .colours = values}};
+      lines.colours = panel.x;
+      Figure map = test::figure_with(panel);
+      const auto different = axis_values({}, {.name = "mu", .unit = {}, .numbers = values});
+      const CellAxis axis = cells_around(different, false);
+      const std::size_t cells = axis.values.size() * axis.values.size();
+      map.panels[0].cells = Cells{.name = "a",
+                                  .x = axis,
+                                  .y = axis,
+                                  .values = std::vector<double>(cells, values[1]),
+                                  .states = std::vector<CellState>(cells, CellState::kSolved)};
+      map.panels[0].x.range = map.panels[0].y.range = {axis.edges.front(), axis.edges.back()};
+      map.colours = panel.x;
+      Figure bars = test::figure_with(panel);
+      bars.panels[0].bars = binned(values, panel.x);
+      EXPECT_LE(bars.panels[0].bars->heights.size(), 200U);
+      for (const Figure& figure : {lines, map, bars}) {
+        EXPECT_THAT(picture_of(figure, PictureFormat::kSvg), HasSubstr("</svg>"));
+        EXPECT_FALSE(output_of_gnuplot(script_for_terminal(figure, 80, 24, false)).empty());
+      }
+    }
+  }
+}
+
+TEST(GnuplotScript, WritesNarrowRangesAsDifferencesFromANumberInTheLabel) {
+  Figure figure = test::lines_of(1, 2);
+  Panel& panel = figure.panels[0];
+  panel.x.range = {0.4, 0.400000001};
+  panel.y.range = {-2.5e-3, -2.5e-3 + 1e-12};
+  panel.curves[0].x = {0.4, 0.4000000005};
+  const auto text = script(figure);
+  EXPECT_THAT(text, HasSubstr("set xlabel 'coefficient of friction \u03bc \u2212 0.4' noenhanced"));
+  EXPECT_THAT(text, HasSubstr("set ylabel 'duration of contact + 2500 [\u00b5s]' noenhanced"));
+  EXPECT_THAT(text, testing::ContainsRegex("set xrange \\[0:[19]\\.?[0-9]*e-(09|10)\\]"));
+}
+
+TEST(GnuplotScript, KeepsThePeaksOfACurveWithManyPoints) {
+  Figure figure = test::lines_of(1, 5001);
+  Curve& curve = figure.panels[0].curves[0];
+  curve.mark = Curve::Mark::kLine;
+  curve.y[1234] = 9.876543;
+  const auto text = script(figure);
+  EXPECT_THAT(text, HasSubstr(" 9876543\n"));
+  EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 1500);
+}
+
+TEST(GnuplotScript, OfAFigureWithoutPanelsIsRefused) {
+  EXPECT_ANY_THROW(picture_of({}, PictureFormat::kSvg));
+  EXPECT_ANY_THROW(picture_of({}, PictureFormat::kScript));
+  EXPECT_ANY_THROW(picture_of({}, PictureFormat::kCsv));
+  EXPECT_ANY_THROW(text_of({}));
 }
 
 TEST(GnuplotScript, ShadesPhasesAndStickAndNamesThemOnce) {

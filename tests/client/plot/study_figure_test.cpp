@@ -206,6 +206,44 @@ TEST(Histogram, ReportsRowsThatItLeavesOut) {
   EXPECT_TRUE(figure_from({.histogram = "margin"}, {"margin"}, {}).is_empty);
 }
 
+TEST(Histogram, OfValuesThatDifferByRoundingHasOneBarAndSaysSo) {
+  for (const double value : {0.43, -5e3, 1e9, 3e-310, 1e300}) {
+    Rows rows;
+    for (double at = value; rows.size() < 20; at = std::nextafter(at, HUGE_VAL)) {
+      rows.push_back({at});
+    }
+    const Figure figure = figure_from({.histogram = "fn_peak_N"}, {"fn_peak_N"}, rows);
+    const Bars& bars = *figure.panels[0].bars;
+    EXPECT_EQ(std::count(bars.heights.begin(), bars.heights.end(), 20.0), 1) << value;
+    EXPECT_LE(bars.heights.size(), 20U);
+    EXPECT_THAT(figure.notes, Contains(HasSubstr("count as one"))) << value;
+  }
+  EXPECT_THAT(figure_from({.histogram = "e"}, {"e"}, Rows(5, {0.5})).notes, testing::IsEmpty());
+}
+
+TEST(Outputs, TooLargeToDrawAreReported) {
+  const Figure figure =
+      figure_from({.histogram = "margin"}, {"margin"}, {{1e305}, {1.0}, {2.0}, {HUGE_VAL}});
+  EXPECT_THAT(figure.notes, ElementsAre("2 of 4 points have no value or lie outside the axis."));
+}
+
+TEST(Lines, HaveNamesThatDistinguishCloseValues) {
+  const Figure figure = figure_from(
+      {.lines = "fn_peak_N", .x = "mu", .by = "H"}, {"mu", "fn_peak_N", "H"},
+      {{1.0, 10.0, 0.5}, {2.0, 20.0, 0.5}, {1.0, 11.0, 0.5 + 1e-9}, {2.0, 21.0, 0.5 + 1e-9}});
+  ASSERT_EQ(figure.panels[0].curves.size(), 2U);
+  EXPECT_EQ(figure.panels[0].curves[0].name, "H = 0.5");
+  EXPECT_EQ(figure.panels[0].curves[1].name, "H = 0.500000001");
+}
+
+TEST(Range, MustBeWideEnoughAndAboveZeroOnALogarithmicScale) {
+  EXPECT_ANY_THROW(range_given({.range = "0.4:0.40000000000001"}));
+  EXPECT_ANY_THROW(range_given({.range = "0:1e305"}));
+  EXPECT_EQ(range_given({.range = "0.4:0.4000001"})->to, 0.4000001);
+  EXPECT_ANY_THROW(figure_from({.histogram = "e", .is_x_logarithmic = true, .range = "0:1"}, {"e"},
+                               {{0.5}, {1.0}}));
+}
+
 TEST(Histogram, SortsTextsAndCombinesRareTexts) {
   Rows rows;
   for (int i = 0; i < 40; ++i) {
@@ -350,7 +388,9 @@ TEST(StudyShape, OfASampleIsNoGridAndHasNoListedValues) {
 
 TEST(Condition, FixesAnOpenAxisAtItsFirstValueAndReportsIt) {
   const auto condition = condition_of({}, grid(), {chosen_axis("--x", "mu", grid())}, true);
-  EXPECT_EQ(condition.sql, "H = 0.5 AND e = 0.5");
+  EXPECT_EQ(condition.sql,
+            "H BETWEEN 0.4999999999995 AND 0.5000000000005 AND "
+            "e BETWEEN 0.4999999999995 AND 0.5000000000005");
   EXPECT_THAT(condition.said,
               ElementsAre(HasSubstr("H has the values 0.5, 1; drawn: H = 0.5"),
                           HasSubstr("e has the values 0.5, 0.8, 1; drawn: e = 0.5")));
@@ -359,18 +399,19 @@ TEST(Condition, FixesAnOpenAxisAtItsFirstValueAndReportsIt) {
 TEST(Condition, DoesNotFixAxesInTheWhereClause) {
   const auto condition = condition_of({.where = "e > 0.6 OR slide_m > 1"}, grid(),
                                       {chosen_axis("--x", "mu", grid())}, true);
-  EXPECT_EQ(condition.sql, "(e > 0.6 OR slide_m > 1) AND H = 0.5");
+  EXPECT_EQ(condition.sql,
+            "(e > 0.6 OR slide_m > 1) AND H BETWEEN 0.4999999999995 AND 0.5000000000005");
 }
 
 TEST(FlagAt, AcceptsAValueAsRoundedInATable) {
   const auto condition =
       condition_of({.at = {"e=0.8", "H=1"}}, grid(), {chosen_axis("--x", "mu", grid())}, true);
-  EXPECT_EQ(condition.sql, "e = 0.8 AND H = 1");
+  EXPECT_THAT(condition.sql, HasSubstr(" AND H BETWEEN 0.999999999999 AND 1.000000000001"));
   EXPECT_THAT(condition.said, IsEmpty());
   const auto thirds =
       shape_of_study("[[block]]\nH = { from = 0.1, to = 1.1, count = 4 }\nmu = 1\ne = 1\n");
   EXPECT_THAT(condition_of({.at = {"H=0.433333"}}, thirds, {}, true).sql,
-              testing::StartsWith("H = 0.43333333"));
+              testing::StartsWith("H BETWEEN 0.43333333"));
 }
 
 TEST(FlagAt, SuggestsTheNearestValueForAnUnknownValue) {

@@ -81,7 +81,7 @@ export class Browser {
     page.on("pageerror", (error) => addError(error.stack));
     page.on("request", (request) => {
       const url = request.url();
-      if (!/^(data|blob):/.test(url) && new URL(url).origin !== this.server.origin) addError(url);
+      if (!/^(data|blob):/.test(url) && !url.startsWith(this.server.origin)) addError(url);
     });
     await page.exposeFunction("reportViolation", addError);
     await page.evaluateOnNewDocument((hurried) => {

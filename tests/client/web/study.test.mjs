@@ -230,6 +230,29 @@ test("all modules are preloaded, and no others", async () => {
   await page.close();
 });
 
+test("axes of any range have several ticks with different, short texts", async () => {
+  const page = await web.study("#/study/1");
+  const wrong = await page.evaluate(async () => {
+    const { baseOf, scale, ticks, tickText } = await import("./lib/scale.js");
+    const found = [];
+    for (const from of [1e-280, 3e-14, 0.4, 1, 6e10, 1e200]) {
+      for (const share of [2e-12, 1e-10, 1e-8, 1e-6, 1e-3, 0.38, 2.3, 11, 450, 1e40]) {
+        for (const isLog of [false, true]) {
+          const to = from * (1 + share);
+          const base = baseOf(from, to);
+          const texts = ticks(scale(from, to, isLog), 6).map((value) => tickText(value, base));
+          const isShort = texts.every((text) => text.length <= 11);
+          if (new Set(texts).size < Math.max(texts.length, 2) || !isShort)
+            found.push({ from, to, isLog, texts });
+        }
+      }
+    }
+    return found;
+  });
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
+
 test("unsuitable addresses show the default view", async () => {
   const page = await web.browser.open("#/");
   for (const [view, picture] of [

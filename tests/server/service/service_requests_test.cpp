@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/model_message.h"
+#include "proto/wire/chunk.h"
 #include "server/study/limits.h"
 #include "tests/server/service/service_fixture.h"
 #include "worker/solver/model/trace_columns.h"
@@ -322,6 +323,33 @@ TEST_F(ServiceTraceTest, TheInputsOfAPointNeedNoWorker) {
   EXPECT_EQ(last_reply().trace().mu(), 1.0);
   EXPECT_EQ(last_reply().trace().model().lengths_m_size(), 3);
   EXPECT_FALSE(last_reply().trace().has_trace());
+}
+
+TEST_F(ServiceTraceTest, ASolvedPointIsSolvedAgainWithTheInputsOfItsRow) {
+  hello_and_credit();
+  answer_batch(1);  // point 0 is solved, the others failed
+  const double solved_H_m = std::nextafter(1.0, 2.0);
+  const double solved_E_Pa = std::nextafter(70e9, 1e12);
+  const auto answer = [](const protocol::Row& row) {
+    ClientReply reply;
+    *reply.mutable_query() = protocol::chunk_of({{"H", "mu", "e", "E_Pa", "links"}, {row}});
+    return protocol::encode(reply);
+  };
+  request_trace(7, 0);
+  ASSERT_EQ(ports_.queries.size(), 1U);
+  EXPECT_THAT(ports_.queries[0].request.sql(), HasSubstr("point = 0"));
+  EXPECT_TRUE(orders().empty());
+  answer_query(0, answer({solved_H_m, 0.5, {}, solved_E_Pa, std::int64_t{3}}));
+  ASSERT_EQ(orders().size(), 1U);
+  EXPECT_EQ(orders()[0].h_m(), solved_H_m);
+  EXPECT_EQ(orders()[0].model().e_pa(), solved_E_Pa);
+  EXPECT_EQ(orders()[0].mu(), 0.0) << "a value that differs by more than rounding is ignored";
+  auto message = trace_request(8, 0);
+  message.mutable_trace()->set_only_point(true);
+  send(message, "client");
+  answer_query(1, answer({solved_H_m, 0.0, 1.0, 70e9, std::int64_t{3}}));
+  EXPECT_EQ(last_reply().request_id(), 8U);
+  EXPECT_EQ(last_reply().trace().h_m(), solved_H_m);
 }
 
 TEST_F(ServiceTraceTest, UnknownStudiesAndPointsAreNamed) {

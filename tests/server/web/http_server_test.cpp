@@ -202,13 +202,40 @@ TEST(HttpServer, SurvivesAnyBytes) {
   EXPECT_EQ(body_of(get(server.url(), "/after")), "/after\n");
 }
 
-TEST(HttpServer, AnAddressAtItsConnectionLimitDoesNotAffectOthers) {
+TEST(HttpServer, SlowHeadsOfAnyNumberOfAddressesDelayNobody) {
   HttpLimits limits;
-  limits.connections_of_one_address = 4;
-  const EchoServer server(limits);
-  const auto silent = silent_peers(server, 4, "127.0.0.2");
-  EXPECT_EQ(RawHttp(server.url(), "127.0.0.2").exchange("GET /a" + kEnd), "");
+  limits.idle = test::kHangLimit;
+  limits.connections = 100;
+  EchoServer server(limits);
+  std::vector<std::unique_ptr<RawHttp>> slow;
+  for (unsigned i = 0; i < 3 * limits.connections; ++i) {
+    slow.push_back(std::make_unique<RawHttp>(server.url(), "127.0.0." + std::to_string(i % 9 + 1)));
+    slow.back()->send("GET / HTTP/1.1\r\n");
+    if (i == 0) {
+      get(server.url(), "/a");  // this answer shows that the first head was accepted
+      server.let_pass(std::chrono::seconds(1));
+    }
+    if (i % 64 == 63) {
+      EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n") << "after " << i + 1 << " slow heads";
+    }
+  }
+  EXPECT_EQ(slow.front()->read_to_the_end(), "") << "the oldest head has made room";
+}
+
+TEST(HttpServer, AFullServerKeepsPendingAnswersAndStreams) {
+  HttpLimits limits;
+  limits.connections = 4;
+  limits.idle = test::kHangLimit;
+  EchoServer server(limits);
+  const auto waiting = begin(server, "/wait");
+  const auto quiet = begin(server, "/quiet");
+  server.wake_until_in_progress(2);
+  const auto silent = silent_peers(server, 10);
   EXPECT_EQ(body_of(get(server.url(), "/a")), "/a\n");
+  EXPECT_EQ(server.in_progress(), 2);
+  server.open();
+  EXPECT_EQ(body_of(waiting->read_to_the_end()), "/wait\n");
+  EXPECT_FALSE(quiet->has_news());
 }
 
 TEST(HttpServer, AnswersAgainWhenTooManyConnectionsHaveEnded) {

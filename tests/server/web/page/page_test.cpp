@@ -25,8 +25,9 @@ TEST(PageAccess, ATokenIsExchangedForACookieAndRemovedFromTheAddress) {
   const PageServer page;
   const std::string answer = page.request("GET", std::string("/?token=") + kTestToken, "");
   EXPECT_EQ(status_of_answer(answer), 303);
-  EXPECT_THAT(answer, HasSubstr("Location: /\r\n"));
-  EXPECT_THAT(answer, HasSubstr("; Path=/; HttpOnly; SameSite=Strict\r\n"));
+  EXPECT_THAT(answer, HasSubstr("Location: ./\r\n"));
+  EXPECT_THAT(answer, HasSubstr("; HttpOnly; SameSite=Strict\r\n"));
+  EXPECT_THAT(answer, Not(HasSubstr("Path="))) << "a proxy may add a prefix to the path";
   EXPECT_THAT(answer, Not(HasSubstr(kTestToken)));
   EXPECT_EQ(page.json("/api/session")["may_change"], true);
   for (const std::string token :
@@ -142,9 +143,10 @@ TEST_F(PageStudyTest, ATraceIsCancelledWhenItsBrowserDisconnects) {
 TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
   const PageServer page;
   const auto type_of = [&](const std::string& path) {
-    const std::string answer = page.request("GET", path, "");
+    const std::string answer = page.request("GET", path, "Accept-Encoding: gzip, deflate\r\n");
     EXPECT_EQ(status_of_answer(answer), 200) << path;
     EXPECT_THAT(answer, HasSubstr("Content-Encoding: gzip\r\n"));
+    EXPECT_THAT(answer, HasSubstr("Vary: Accept-Encoding\r\n"));
     EXPECT_THAT(body_of(answer), StartsWith("\x1f\x8b"));
     const std::string name = "Content-Type: ";
     const std::size_t at = answer.find(name) + name.size();
@@ -163,6 +165,57 @@ TEST(PageFiles, AreSentGzippedWithTheirTypesUnlessCached) {
     EXPECT_EQ(status_of_answer(page.request("GET", path, "If-None-Match: \"other\"\r\n")), 200)
         << path;
   }
+}
+
+TEST(PageFiles, ArePlainUnlessTheClientAcceptsGzip) {
+  const PageServer page;
+  for (const std::string accepted :
+       {"", "Accept-Encoding: identity\r\n", "Accept-Encoding: gzip;q=0\r\n",
+        "Accept-Encoding: *;q=0\r\n", "Accept-Encoding: br, gzip ; q=0.000 , identity\r\n",
+        "Accept-Encoding:\r\n", "Accept-Encoding: gzipped\r\n", "Accept-Encoding: *\r\n"}) {
+    for (const PageFile& file : page_files()) {
+      const std::string answer = page.request("GET", std::string(file.path), accepted);
+      EXPECT_EQ(body_of(answer), std::string(file.plain.begin(), file.plain.end())) << accepted;
+      EXPECT_THAT(answer, Not(HasSubstr("Content-Encoding")));
+      EXPECT_THAT(answer, HasSubstr("Vary: Accept-Encoding\r\n"));
+    }
+  }
+  for (const std::string accepted :
+       {"gzip", "br;q=1, gzip;q=0.5", "GZIP", "gzip;q=0.001", "x-gzip", "identity;q=0,gzip"}) {
+    EXPECT_THAT(page.request("GET", "/main.js", "Accept-Encoding: " + accepted + "\r\n"),
+                HasSubstr("Content-Encoding: gzip\r\n"))
+        << accepted;
+  }
+}
+
+TEST(PageFiles, ThePagePreloadsItsModules) {
+  const std::string page = body_of(PageServer().request("GET", "/", ""));
+  EXPECT_THAT(page, HasSubstr("\n<link rel=\"modulepreload\" href=\"study/study.js\">\n"));
+  EXPECT_THAT(page, Not(HasSubstr("href=\"main.js\"")));
+}
+
+TEST(PageFiles, NameNoAddressFromTheRootOfTheHost) {
+  for (const PageFile& file : page_files()) {
+    const std::string text(file.plain.begin(), file.plain.end());
+    if (!file.path.starts_with("/vendor/")) {
+      EXPECT_THAT(text, Not(testing::ContainsRegex("(href|src)=\"/"))) << file.path;
+      EXPECT_THAT(text, Not(testing::ContainsRegex("[\"'`]/api/"))) << file.path;
+    }
+  }
+}
+
+TEST(PageAccess, ChangesThroughAProxyComeFromTheHostThatItNames) {
+  const PageServer page;
+  const std::string proxied = page.cookie_header() + "Content-Length: 0\r\n" +
+                              "Origin: https://hub.example\r\nSec-Fetch-Site: same-origin\r\n";
+  const std::string path = "/api/studies/7/pause";
+  EXPECT_EQ(
+      status_of_answer(page.request("POST", path, proxied + "X-Forwarded-Host: hub.example\r\n")),
+      404);
+  EXPECT_EQ(status_of_answer(page.request("POST", path, proxied)), 403);
+  EXPECT_EQ(
+      status_of_answer(page.request("POST", path, proxied + "X-Forwarded-Host: other.example\r\n")),
+      403);
 }
 
 TEST(PageFiles, AreSmall) {
