@@ -118,10 +118,13 @@ int converge(const ConvergeFlags& flags, Console& console) {
   print_refinement(console.out(), mesh);
   console.out() << fmt::format(
       "\nStep: steps of contact{}, halved from level to level, on n = {}\n\n",
-      exact_fall ? "" : " and fall", model.elements_per_link);
+      steps.back().model.dt_fall_s > 0.0 ? " and fall" : "", model.elements_per_link);
   print_refinement(console.out(), step);
   if (exact_fall) {
     console.out() << fall_sentence(step, *exact_fall);
+  } else if (steps.back().model.dt_fall_s == 0.0) {
+    console.out()
+        << "The error of the fall is not estimated: no tolerance is smaller than its own.\n";
   }
   return kDone;
 }

@@ -70,7 +70,7 @@ int watch(Console& console, const SubmitFlags& flags, const Study& study, Connec
   if (stop.requested()) {
     throw Interrupted("watching ended");
   }
-  const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
+  const Tell tell = tell_errors(console);
   if (const auto rows = flags.limit.value_or(0); rows > 0) {
     print_first(console, connection.chunks(request_for({.study = study.name, .limit = rows}), tell),
                 status.points());

@@ -139,6 +139,9 @@ Extrapolation extrapolate(std::span<const double> values, double highest_order, 
 
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter) {
+  if (longer.size() < shorter.size() || (longer.size() - shorter.size()) % 2 != 0) {
+    throw std::invalid_argument("the lengths of the lists must differ by an even number");
+  }
   const std::size_t columns = shorter.size() + 1;
   // cost[i * columns + j]: minimum cost of matching the first i of `longer` to j of `shorter`.
   constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -339,11 +342,11 @@ std::vector<Level> step_levels(const solver::ModelParameters& model, double e_st
 std::optional<Level> exact_fall_level(const Level& level) {
   constexpr double kPart = 0.1;
   constexpr double kTightest = 1e-9;  // smallest tolerance of a model
-  if (!falls_by_accuracy(level.model)) {
+  const double solved_for = std::min(level.model.tolerance, solver::ModelParameters().tolerance);
+  if (!falls_by_accuracy(level.model) || solved_for <= kTightest) {
     return std::nullopt;
   }
   Level exact{"exact fall", level.model};
-  const double solved_for = std::min(level.model.tolerance, solver::ModelParameters().tolerance);
   exact.model.tolerance = std::max(kPart * solved_for, kTightest);
   return exact;
 }

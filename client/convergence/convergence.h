@@ -114,7 +114,7 @@ const char* name_of(ContactChange::Kind kind);
 
 /// Matches two lists of ascending times whose lengths differ by an even number. The surplus of
 /// `longer` is left out in pairs of neighbours so that the sum of |differences| to `shorter` is
-/// minimal. Returns the first index of each pair.
+/// minimal. Returns the first index of each pair. Throws std::invalid_argument for other lengths.
 std::vector<std::size_t> lone_pairs(const std::vector<double>& longer,
                                     const std::vector<double>& shorter);
 

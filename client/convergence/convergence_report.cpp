@@ -137,8 +137,14 @@ void print_verdict(std::ostream& out, const Refinement& refinement) {
   out << (convergence.has_one_mode ? fmt::format("the mode settles, but these outputs do not: {}",
                                                  fmt::join(unsettled, ", "))
                                    : "the mode differs on the finest three levels");
-  if (!convergence.changes.empty()) {
-    out << "; to blame: " << change_sentence(refinement, convergence.changes.back());
+  // Values of the finest levels differ. Events that only coarser levels lack do not explain that.
+  const std::size_t compared = convergence.has_one_mode ? 2 : 3;
+  if (!convergence.changes.empty() &&
+      convergence.changes.back().finer_level + compared > refinement.levels.size()) {
+    out << "; a possible cause: " << change_sentence(refinement, convergence.changes.back());
+  } else {
+    out << fmt::format("; no event differs between the finest {} levels: refine further with {}",
+                       compared, refinement.what == "mesh" ? "--finest" : "--halvings");
   }
   out << ".\n";
 }

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
@@ -79,24 +80,38 @@ void check(const AnswerFlags& flags) {
   }
 }
 
-Answer answer_of(nlohmann::ordered_json facts, protocol::Table rows, plot::Figure figure) {
-  facts["rows"] =
-      nlohmann::ordered_json::parse(text_of({protocol::chunk_of(rows)}, {.format = Format::kJson}));
+bool wants_picture(const AnswerFlags& flags) {
+  return !flags.file.empty() && !flags.file.ends_with(".csv") && !flags.file.ends_with(".json");
+}
+
+Answer answer_of(nlohmann::ordered_json facts, protocol::Table rows, plot::Figure figure,
+                 std::vector<std::string> notes) {
+  facts["rows"] = json_rows(rows);
+  facts["notes"] = notes;
   auto tables = text_of(with_intervals(rows));
+  for (const std::string& note : notes) {
+    tables += (&note == notes.data() ? "\n" : "") + note + '\n';
+  }
   return {.tables = std::move(tables),
           .rows = std::move(rows),
           .json = facts.dump(2),
-          .figure = std::move(figure)};
+          .figure = std::move(figure),
+          .notes = std::move(notes)};
 }
 
 void put_out(Console& console, const AnswerFlags& flags, const Answer& answer) {
-  console.out() << text_in_format(answer, format_named(flags.format, kTextFormats));
+  const auto format = format_named(flags.format, kTextFormats);
+  console.out() << text_in_format(answer, format);
+  for (const std::string& note :
+       format == Format::kCsv ? answer.notes : std::vector<std::string>()) {
+    console.note("Note: " + note);
+  }
   if (!flags.file.empty()) {
     AtomicFile file(flags.file);
-    file.append(flags.file.ends_with(".csv") ? text_in_format(answer, Format::kCsv)
-                : flags.file.ends_with(".json")
-                    ? text_in_format(answer, Format::kJson)
-                    : plot::picture_of(answer.figure, plot::picture_format({}, flags.file)));
+    file.append(
+        wants_picture(flags)
+            ? plot::picture_of(answer.figure, plot::picture_format({}, flags.file))
+            : text_in_format(answer, flags.file.ends_with(".csv") ? Format::kCsv : Format::kJson));
     file.finish();
   }
 }
@@ -111,6 +126,11 @@ void append_columns(protocol::Table& table, const std::string& name) {
 
 void append_values(protocol::Row& row, const Estimate& estimate) {
   row.insert(row.end(), {value_of(estimate.value), value_of(estimate.from), value_of(estimate.to)});
+}
+
+nlohmann::ordered_json json_rows(const protocol::Table& table) {
+  return nlohmann::ordered_json::parse(
+      text_of({protocol::chunk_of(table)}, {.format = Format::kJson}));
 }
 
 std::string text_of(const protocol::Table& table) {

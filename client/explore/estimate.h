@@ -6,6 +6,9 @@ namespace oblique::client {
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
+/// Values that differ by at most this part of their size may differ by rounding errors alone.
+inline constexpr double kRounding = 1e-12;
+
 /// An estimate with its 95 % interval; NaN: undefined.
 struct Estimate {
   double value = kNaN;

@@ -13,6 +13,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "client/explore/uncertainty.h"
 #include "client/io/console.h"
 #include "proto/recipe/sampling.h"
 #include "worker/solver/model/errors.h"
@@ -231,7 +232,7 @@ void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& f
       return problem.unknowns[i].value_at(fit.minimum.angles[at] + change);
     };
     const double slope = (value(kDifference) - value(-kDifference)) / (2.0 * kDifference);
-    fit.unknowns[i].sd = slope * std::sqrt(fit.covariance(at, at) * fit.scale);
+    fit.unknowns[i].sd = slope * std::sqrt(fit.covariance(at, at));
   }
   for (Index k = 0; k < values.size() && values[k] < kPoorlyDetermined; ++k) {
     Combination combination{.unknowns = {}, .is_undetermined = values[k] < kUndetermined};
@@ -245,31 +246,57 @@ void add_covariance(const FitProblem& problem, const std::vector<std::size_t>& f
   }
 }
 
+/// Sets `has_effect` of all unknowns. Where the derivatives vanish, as they do at a bound, a step
+/// inwards decides. Returns the unknowns with derivatives.
+std::vector<std::size_t> find_effects(const FitProblem& problem, Fit& fit) {
+  constexpr double kLeastEffect = 0.1;  // effect from bound to bound, in standard deviations
+  std::vector<std::size_t> steep;
+  std::vector<std::size_t> flat;
+  std::vector<VectorXd> points;
+  for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
+    if (fit.minimum.jacobian.col(index_of(i)).norm() * pi >= kLeastEffect) {
+      steep.push_back(i);
+    } else {
+      flat.push_back(i);
+      VectorXd angles = fit.minimum.angles;
+      angles[index_of(i)] += pi / 2.0;  // from a bound to the middle of the range
+      points.push_back(parameters_at(problem, angles));
+    }
+  }
+  const auto predictions = flat.empty() ? points : problem.evaluate(points, "effects");
+  for (std::size_t p = 0; p < flat.size(); ++p) {
+    const VectorXd change = residuals_of(problem, predictions.at(p)) - fit.minimum.residuals;
+    fit.unknowns[flat[p]].has_effect = change.norm() >= kLeastEffect;
+  }
+  return steep;
+}
+
 /// The result at a minimum, without intervals.
 Fit fit_at(const FitProblem& problem, const FitStep& minimum, bool is_scaled) {
-  constexpr double kLeastEffect = 0.1;  // effect from bound to bound, in standard deviations
   constexpr double kLeastScale = 1e-6;  // if the data are exact, chi2 has only numerical errors
   Fit fit;
   fit.minimum = minimum;
   fit.unknowns.resize(problem.unknowns.size());
   fit.covariance = MatrixXd::Zero(minimum.angles.size(), minimum.angles.size());
-  fit.degrees_of_freedom =
-      static_cast<std::size_t>(minimum.jacobian.rows() - minimum.jacobian.cols());
-  if (is_scaled) {
-    fit.scale = std::max(minimum.chi2 / static_cast<double>(fit.degrees_of_freedom), kLeastScale);
-  }
-  std::vector<std::size_t> free;
   for (std::size_t i = 0; i < fit.unknowns.size(); ++i) {
-    auto& unknown = fit.unknowns[i];
-    unknown.estimate.value = minimum.parameters[index_of(i)];
-    unknown.is_at_bound = std::abs(std::sin(minimum.angles[index_of(i)])) < kAtBound;
-    unknown.has_effect = minimum.jacobian.col(index_of(i)).norm() * pi >= kLeastEffect;
-    if (!unknown.is_at_bound && unknown.has_effect) {
-      free.push_back(i);
-    }
+    fit.unknowns[i].estimate.value = minimum.parameters[index_of(i)];
+    fit.unknowns[i].is_at_bound = std::abs(std::sin(minimum.angles[index_of(i)])) < kAtBound;
   }
+  auto free = find_effects(problem, fit);
+  std::erase_if(free, [&](std::size_t i) { return fit.unknowns[i].is_at_bound; });
   if (!free.empty()) {
     add_covariance(problem, free, fit);
+  }
+  const auto undetermined = std::ranges::count_if(fit.combinations, &Combination::is_undetermined);
+  fit.degrees_of_freedom = static_cast<std::size_t>(minimum.residuals.size()) - free.size() +
+                           static_cast<std::size_t>(undetermined);
+  fit.limit = kChi2Quantile;
+  if (is_scaled) {
+    fit.scale = std::max(minimum.chi2 / static_cast<double>(fit.degrees_of_freedom), kLeastScale);
+    fit.limit = fit.scale * std::pow(t_quantile(fit.degrees_of_freedom), 2.0);
+  }
+  for (auto& unknown : fit.unknowns) {
+    unknown.sd *= std::sqrt(fit.scale);
   }
   return fit;
 }
@@ -363,11 +390,10 @@ class IntervalEnd {
 /// Adds the intervals, all ends in parallel. Returns the step with the least chi2 of all trials.
 FitStep add_intervals(const FitProblem& problem, Fit& fit) {
   constexpr int kMaxRounds = 40;
-  const double limit = kChi2Quantile * fit.scale;
   std::vector<IntervalEnd> ends;
   for (Index i = 0; i < fit.covariance.rows(); ++i) {
-    ends.emplace_back(fit.minimum, i, -1.0, limit);
-    ends.emplace_back(fit.minimum, i, 1.0, limit);
+    ends.emplace_back(fit.minimum, i, -1.0, fit.limit);
+    ends.emplace_back(fit.minimum, i, 1.0, fit.limit);
   }
   FitStep least = fit.minimum;
   for (int round = 1; round <= kMaxRounds; ++round) {
@@ -421,7 +447,7 @@ Fit fit(const FitProblem& problem, bool is_scaled) {
   for (int i = 0; i < kMaxStarts; ++i) {
     found = fit_at(problem, minimise(problem, start), is_scaled);
     const FitStep least = add_intervals(problem, found);
-    if (least.chi2 > found.minimum.chi2 - kSmallerChi2 - 0.01 * kChi2Quantile * found.scale) {
+    if (least.chi2 > found.minimum.chi2 - kSmallerChi2 - 0.01 * found.limit) {
       break;
     }
     start = least.angles;

@@ -67,7 +67,7 @@ struct FittedUnknown {
   Estimate estimate;  ///< profile-likelihood interval; an end at the unknown's bound is NaN
   double sd = kNaN;   ///< from the covariance
   bool is_at_bound = false;
-  bool has_effect = true;  ///< on any prediction
+  bool has_effect = true;  ///< on any prediction, between the bounds
   bool is_cut = false;     ///< chi2 jumps, or an output is missing, at an end of the interval
 };
 
@@ -81,8 +81,10 @@ struct Fit {
   FitStep minimum;
   std::vector<FittedUnknown> unknowns;
   Eigen::MatrixXd covariance;  ///< of the unknowns' angles; 0 if at a bound or without effect
+  /// Measured numbers without the combinations of unknowns that they determine.
   std::size_t degrees_of_freedom = 0;
   double scale = 1.0;  ///< factor of all variances
+  double limit = 0.0;  ///< rise of chi2 to the ends of the intervals
   std::vector<Combination> combinations;
 
   double correlation(Eigen::Index i, Eigen::Index j) const;
@@ -90,11 +92,13 @@ struct Fit {
 
 /// Finds the least chi2, the covariance (J^T J)^-1 and 95 % profile-likelihood intervals. An
 /// interval contains the values of an unknown for which chi2, minimised over the others, is at most
-/// 3.84 scale above its minimum. The fit starts from the best of the given start and 15 points of
-/// Sobol's sequence. It restarts up to three times if the search for intervals finds a smaller
-/// chi2. This search takes at most 40 calls of `evaluate`. With `is_scaled` the standard deviations
-/// are known up to one factor: scale is chi2 / degrees of freedom, which needs more data than
-/// unknowns. Otherwise scale is 1. Throws the errors of `FitProblem::check` and `minimise`.
+/// `limit` above its minimum: 3.84, the 95 % quantile of chi2 with one degree of freedom. The fit
+/// starts from the best of the given start and 15 points of Sobol's sequence. It restarts up to
+/// three times if the search for intervals finds a smaller chi2. This search takes at most 40 calls
+/// of `evaluate`. With `is_scaled` the standard deviations are known up to one factor: scale is
+/// chi2 / degrees of freedom, which needs more data than unknowns, and `limit` is scale t^2 with
+/// the 97.5 % quantile t of Student's distribution. Otherwise scale is 1. Throws the errors of
+/// `FitProblem::check` and `minimise`.
 Fit fit(const FitProblem& problem, bool is_scaled = false);
 
 }  // namespace oblique::client

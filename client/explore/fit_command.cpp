@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -69,26 +70,37 @@ struct FitFlags {
   AnswerFlags answer;
   std::string from{kUsualFrom};
   bool json = false;
+  const CLI::App* command = nullptr;  ///< the parsed command line
 };
 
 // ---- The paper's numbers ----
 
-/// Returns the preset of --from with the mesh of the flags. Throws InputError for other flags.
+/// Returns the preset of --from with the mesh of the flags. Throws InputError for flags that have
+/// no effect without measured numbers.
 solver::ModelParameters paper_start(const FitFlags& flags) {
   constexpr const char* kMesh = "elements_per_link";
-  PointFlags points = flags.points;
+  constexpr std::array kAllowed{
+      "--from", "--elements-per-link", "--json", "--format", "--out", "--quiet", "--verbose"};
+  for (const auto* option : flags.command->get_options()) {
+    if (option->count() > 0 && std::ranges::count(kAllowed, option->get_name()) == 0) {
+      throw InputError(fmt::format(
+          "{} needs measured numbers: `oblique fit MEASURED.csv --fit ...`; without a file the "
+          "paper's numbers are fitted, with --from, --elements-per-link and the output flags alone",
+          option->get_name()));
+    }
+  }
+  if (wants_picture(flags.answer)) {
+    throw InputError(fmt::format(
+        "--out {}: the fit to the paper's numbers has no picture: end the name with .csv or .json",
+        flags.answer.file));
+  }
   auto start = solver::preset(flags.from);
   start.elements_per_link = solver::preset("paper").elements_per_link;
-  if (const auto mesh = points.axes.extract(kMesh); !mesh.empty()) {
+  if (const auto mesh = flags.points.axes.find(kMesh); mesh != flags.points.axes.end()) {
     const auto& key = *solver::find_model_key(kMesh);
-    const double elements = solver::number_of(mesh.mapped()).value_or(kNaN);
+    const double elements = solver::number_of(mesh->second).value_or(kNaN);
     solver::check_value(key, elements);
     key.set(start, elements);
-  }
-  if (points != PointFlags() || !flags.fit.empty() || !flags.deviation.empty()) {
-    throw InputError(
-        "a fit of measured numbers needs their file: `oblique fit MEASURED.csv --fit ...`; without "
-        "one the paper's numbers are fitted, with --from, --elements-per-link and --json alone");
   }
   solver::validate(start);
   return start;
@@ -286,6 +298,21 @@ std::string settings_of(const MeasuredFit& fit, const FitFlags& flags) {
 
 // ---- Answer ----
 
+/// Returns "is at its bound 1; values down to 0.977 fit as well." Wider bounds are advised where
+/// the key allows them.
+std::string bound_note(const Unknown& unknown, const Estimate& fitted) {
+  const bool is_lower = fitted.value - unknown.from < unknown.to - fitted.value;
+  const double bound = is_lower ? unknown.from : unknown.to;
+  const double other = is_lower ? unknown.to : unknown.from;
+  const double end = is_lower ? fitted.to : fitted.from;
+  const bool may_be_wider =
+      protocol::axis_key(unknown.name).is_allowed(bound + 1e-3 * (bound - other));
+  return fmt::format("is at its bound {}; {}values {} to {} fit as well.{}", readable_number(bound),
+                     std::isnan(end) ? "all " : "", is_lower ? "up" : "down",
+                     readable_number(std::isnan(end) ? other : end),
+                     may_be_wider ? " Values beyond the bound may fit better." : "");
+}
+
 /// Returns sentences about the unknowns that the data do not determine.
 std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fit& fit) {
   std::vector<std::string> notes;
@@ -300,14 +327,14 @@ std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fi
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
     const auto& fitted = fit.unknowns[i];
     const bool has_ends = !std::isnan(fitted.estimate.from) && !std::isnan(fitted.estimate.to);
-    const auto* const what =
+    const std::string what =
         !fitted.has_effect   ? "has no effect on these data."
-        : fitted.is_at_bound ? "is at a bound: wider bounds may fit better."
+        : fitted.is_at_bound ? bound_note(unknowns[i], fitted.estimate)
         : !has_ends          ? "has an interval that reaches a bound, where the end is left empty."
         : fitted.is_cut ? "has an interval that ends where an output jumps, or is missing, because "
                           "the sequence of states changes."
                         : "";
-    if (*what != '\0') {
+    if (!what.empty()) {
       notes.push_back(fmt::format("{} {}", unknowns[i].name, what));
     }
   }
@@ -316,6 +343,12 @@ std::vector<std::string> notes_of(const std::vector<Unknown>& unknowns, const Fi
     notes.emplace_back(
         "chi2 is larger than the deviations explain: they are too small, the model lacks "
         "something, or another start leads to a lower minimum. --scale widens the intervals.");
+  }
+  if (fit.scale < 1.0) {
+    notes.push_back(
+        fmt::format("chi2 is small, so --scale narrows sd to {} of its size: leave it out if the "
+                    "deviations are known.",
+                    readable_number(std::sqrt(fit.scale), 2)));
   }
   return notes;
 }
@@ -386,22 +419,18 @@ Answer fit_answer(const MeasuredFit& fitted, const Fit& fit, const GrowingStudy&
   const auto notes = notes_of(unknowns, fit);
   const auto table = table_of_unknowns(unknowns, fit);
   const auto residuals = table_of_residuals(fitted.measured, fit.minimum);
-  const auto json_of_rows = [](const protocol::Table& rows) {
-    return nlohmann::ordered_json::parse(
-        text_of({protocol::chunk_of(rows)}, {.format = Format::kJson}));
-  };
   nlohmann::ordered_json json{
       {"study", study.name()},    {"iterations", fit.minimum.iteration},
       {"rounds", study.rounds()}, {"points", study.points()},
       {"chi2", fit.minimum.chi2}, {"degrees_of_freedom", fit.degrees_of_freedom},
-      {"scale", fit.scale},       {"unknowns", json_of_rows(table)}};
+      {"scale", fit.scale},       {"unknowns", json_rows(table)}};
   for (Index i = 0; i < fit.covariance.rows(); ++i) {
     for (Index j = 0; j < fit.covariance.cols(); ++j) {
       json["correlation"][static_cast<std::size_t>(i)].push_back(fit.correlation(i, j));
     }
   }
   json["notes"] = notes;
-  json["residuals"] = json_of_rows(residuals);
+  json["residuals"] = json_rows(residuals);
   const auto summary =
       fmt::format("chi2 = {} with {}{}", readable_number(fit.minimum.chi2, 4),
                   counted(fit.degrees_of_freedom, "degree of freedom", "degrees of freedom"),
@@ -412,11 +441,12 @@ Answer fit_answer(const MeasuredFit& fitted, const Fit& fit, const GrowingStudy&
                                 notes.empty() ? "" : "\n", text_of(residuals)),
           .rows = table,
           .json = json.dump(2),
-          .figure = figure_of(fitted.measured, fit.minimum)};
+          .figure = figure_of(fitted.measured, fit.minimum),
+          .notes = notes};
 }
 
 int fit_to_measurements(const FitFlags& flags, Console& console) {
-  if (flags.from != kUsualFrom) {
+  if (flags.command->count("--from") > 0) {
     throw InputError(
         "--from is allowed only in a fit to the paper's numbers: use --preset to choose the model");
   }
@@ -428,7 +458,13 @@ int fit_to_measurements(const FitFlags& flags, Console& console) {
     fitted.problem.evaluate = [&](const std::vector<VectorXd>& points, const std::string& what) {
       return predictions_of(fitted.measured, study.solve(block_of(fitted, points), columns, what));
     };
-    put_out(console, flags.answer, fit_answer(fitted, fit(fitted.problem, flags.is_scaled), study));
+    try {
+      const Fit found = fit(fitted.problem, flags.is_scaled);
+      put_out(console, flags.answer, fit_answer(fitted, found, study));
+    } catch (const solver::SolveError& error) {
+      throw solver::SolveError(
+          fmt::format("{}.{}", error.what(), first_failure(study.source(), name)));
+    }
     return kDone;
   });
 }
@@ -477,6 +513,7 @@ void add_fit(CLI::App& app, Action& parsed) {
   add_answer_flags(command, flags.answer);
   add_explore_flags(command, flags.explore);
   add_point_flags(command, flags.points, FlagValues::kOne);
+  flags.command = &command;
 }
 
 }  // namespace oblique::client

@@ -1,10 +1,12 @@
 #include "client/explore/growing_study.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
+#include <Eigen/Core>
 
 #include "client/commands/shared.h"
 #include "client/service/watching.h"
@@ -16,6 +18,25 @@
 #include "worker/solver/model/errors.h"
 
 namespace oblique::client {
+
+namespace {
+
+/// Whether two blocks have the same points within the tolerance of results. Mathematical libraries
+/// round differently on different processors.
+bool is_nearly_same(const protocol::Block& stored, protocol::Block given) {
+  for (int i = 0; i < std::min(stored.axes_size(), given.axes_size()); ++i) {
+    const auto& values = stored.axes(i).values();
+    auto& others = *given.mutable_axes(i)->mutable_values();
+    if (values.size() == others.size() &&
+        Eigen::VectorXd::Map(values.data(), values.size())
+            .isApprox(Eigen::VectorXd::Map(others.data(), values.size()), 1e-12)) {
+      others = values;
+    }
+  }
+  return protocol::is_same_block(stored, given);
+}
+
+}  // namespace
 
 void add_explore_flags(CLI::App& command, ExploreFlags& flags) {
   command
@@ -78,18 +99,7 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
     return !stop_.requested();
   });
   *recipe_.mutable_model() = protocol::to_message(model);
-  const auto found = connection_->query(
-      fmt::format("SELECT 1 FROM studies WHERE name = {}", server::sql_text(name_)));
-  if (found.rows.empty()) {
-    return;
-  }
-  stored_ = connection_->describe(name_);
-  if (stored_.errors() ||
-      stored_.model().SerializeAsString() != recipe_.model().SerializeAsString()) {
-    throw solver::InputError(fmt::format(
-        "the study \"{}\" exists with another model or with estimated errors: give another --name",
-        name_));
-  }
+  read_stored();
 }
 
 GrowingStudy::~GrowingStudy() = default;
@@ -103,16 +113,48 @@ void GrowingStudy::report_service() {
   }
 }
 
-void GrowingStudy::submit(const protocol::Recipe& recipe) {
-  protocol::check_size(recipe);
-  const auto reply =
-      connection_->submit({.name = name_, .recipe = recipe}, {.no_reuse = no_reuse_});
+bool GrowingStudy::read_stored() {
+  const auto found = connection_->query(
+      fmt::format("SELECT 1 FROM studies WHERE name = {}", server::sql_text(name_)));
+  if (found.rows.empty()) {
+    return false;
+  }
+  stored_ = connection_->describe(name_);
+  if (stored_.errors() ||
+      stored_.model().SerializeAsString() != recipe_.model().SerializeAsString()) {
+    throw solver::InputError(fmt::format(
+        "the study \"{}\" exists with another model or with estimated errors: give another --name",
+        name_));
+  }
+  for (int i = 0; i < recipe_.blocks_size(); ++i) {
+    if (i == stored_.blocks_size() || !is_nearly_same(stored_.blocks(i), recipe_.blocks(i))) {
+      return false;
+    }
+    *recipe_.mutable_blocks(i) = stored_.blocks(i);
+  }
+  return true;
+}
+
+void GrowingStudy::submit() {
+  const auto& longer = stored_.blocks_size() > recipe_.blocks_size() ? stored_ : recipe_;
+  const int blocks = longer.blocks_size();
+  protocol::check_size(longer);
+  protocol::SubmitReply reply;
+  try {
+    reply = connection_->submit({.name = name_, .recipe = longer}, {.no_reuse = no_reuse_});
+  } catch (const std::runtime_error&) {
+    // Another client may have added blocks.
+    if (!read_stored() || stored_.blocks_size() <= blocks) {
+      throw;
+    }
+    return submit();
+  }
   if (std::exchange(is_submitted_, true)) {
     return;
   }
   if (reply.created()) {
-    note_coarse_mesh(console_.notes(), recipe);
-    note_unusual_values(console_.notes(), recipe);
+    note_coarse_mesh(console_.notes(), recipe_);
+    note_unusual_values(console_.notes(), recipe_);
   } else {
     console_.notes() << fmt::format("Continuing \"{}\": {} of {} points are done.\n", name_,
                                     format_count(reply.completed()), format_count(reply.points()));
@@ -144,21 +186,26 @@ protocol::Table GrowingStudy::solve(const protocol::Block& block, const std::str
                                     const std::string& what) {
   const int round = recipe_.blocks_size();
   const bool is_stored = round < stored_.blocks_size();
-  if (is_stored && !protocol::is_same_block(stored_.blocks(round), block)) {
+  if (is_stored && !is_nearly_same(stored_.blocks(round), block)) {
     throw solver::InputError(fmt::format(
         "the study \"{}\" exists and its block {} has other points than this command: give another "
         "--name",
         name_, round + 1));
   }
-  *recipe_.add_blocks() = block;
+  *recipe_.add_blocks() = is_stored ? stored_.blocks(round) : block;
   const std::uint64_t first = std::exchange(points_, points_ + protocol::points_of_block(block));
+  const auto statement =
+      fmt::format("SELECT {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} ORDER BY point",
+                  columns, server::sql_text(name_), first, points_ - 1);
   if (!is_stored || !is_submitted_) {
-    submit(is_stored ? stored_ : recipe_);
+    submit();
     wait(what);
   }
-  auto table = connection_->query(
-      fmt::format("SELECT {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} ORDER BY point",
-                  columns, server::sql_text(name_), first, points_ - 1));
+  auto table = connection_->query(statement);
+  if (table.rows.size() != points_ - first) {
+    wait(what);  // another client has added the block, and has not all of its results
+    table = connection_->query(statement);
+  }
   if (table.rows.size() != points_ - first) {
     throw std::runtime_error(
         fmt::format("the study \"{}\" has {} of the {} points of its block {}; another command may "

@@ -41,8 +41,9 @@ std::string explored_name(const ExploreFlags& flags, std::string_view verb,
 int run_exploration(Console& console, const std::function<int(protocol::StopSignals& stop)>& work);
 
 /// A study that grows round by round. Each round appends a block, which must be a deterministic
-/// function of the results before it. Stored blocks are not solved again, so the same calls
-/// continue an exploration that was stopped.
+/// function of the results before it, but for rounding errors. Stored blocks are not solved again,
+/// so the same calls continue an exploration that was stopped, or one that another client grows at
+/// the same time.
 class GrowingStudy {
  public:
   /// Connects to the server, or starts a server with workers, for as long as this object lives.
@@ -61,6 +62,7 @@ class GrowingStudy {
   protocol::Table solve(const protocol::Block& block, const std::string& columns,
                         const std::string& what);
 
+  Source& source() const { return *connection_; }
   const std::string& name() const { return name_; }
   std::size_t rounds() const { return static_cast<std::size_t>(recipe_.blocks_size()); }
   std::uint64_t points() const { return points_; }  ///< number of points in all rounds so far
@@ -68,7 +70,11 @@ class GrowingStudy {
  private:
   /// Prints news of the embedded server and its workers. Throws if one of them has ended.
   void report_service();
-  void submit(const protocol::Recipe& recipe);
+  /// Submits the blocks so far, or the stored study where it is longer.
+  void submit();
+  /// Reads the stored study. Returns whether it exists and begins with the blocks so far, which
+  /// then become those of the stored study. Throws solver::InputError if it has another model.
+  bool read_stored();
   void wait(const std::string& what);
 
   Console& console_;
@@ -78,7 +84,7 @@ class GrowingStudy {
   std::unique_ptr<EmbeddedService> service_;  ///< null if --server names the server
   std::unique_ptr<Connection> connection_;
   protocol::Recipe recipe_;    ///< the rounds so far
-  protocol::Recipe stored_;    ///< the study that the server had at the start
+  protocol::Recipe stored_;    ///< the study that the server had when last described
   bool is_submitted_ = false;  ///< set by the first submission, which resumes a paused study
   std::uint64_t points_ = 0;
 };

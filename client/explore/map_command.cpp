@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -267,6 +268,7 @@ struct FoundMap {
   std::vector<CurveShift> shifts = {};  ///< of each curve
   /// The values of --over at the points of the coarse grid, row by row from the lowest; NaN: none.
   std::vector<double> over = {};
+  std::vector<std::string> notes = {};
 
   const std::string& name_of(int region) const {
     return regions[static_cast<std::size_t>(region)].name;
@@ -316,6 +318,12 @@ FoundMap find_map(const MapFlags& flags, const MapPlane& plane, GrowingStudy& st
         map.over.push_back(number_in(row.back()));
       }
     }
+    if (is_coarse_grid && std::ranges::all_of(table.rows, [](const auto& row) {
+          return !std::holds_alternative<std::string>(row.front());
+        })) {
+      throw std::runtime_error(fmt::format("no point of the grid has a value of {}.{}", flags.of,
+                                           first_failure(study.source(), study.name())));
+    }
     return regions;
   };
   const int elements = plane.model.elements_per_link;
@@ -325,6 +333,13 @@ FoundMap find_map(const MapFlags& flags, const MapPlane& plane, GrowingStudy& st
   map.shifts = find_shifts(plane.grid, map.borders, kEvery,
                            [&](const auto& points) { return solve(points, 2 * elements); });
   sort_regions(map);
+  if (map.regions.size() == 1) {
+    map.notes.push_back(fmt::format("No border was found: all points are in the region {}.",
+                                    map.regions.front().name));
+  }
+  if (!map.over.empty() && std::ranges::none_of(map.over, [](double at) { return at == at; })) {
+    map.notes.push_back(fmt::format("No point of the grid has a number of {}.", flags.over));
+  }
   return map;
 }
 
@@ -440,10 +455,11 @@ std::string tables_of(const FoundMap& map) {
   const auto borders = map.borders.vertices.empty() ? "" : text_of(table_of_borders(map)) + '\n';
   return fmt::format(
       "{}\n{}{} vertices, each in a bracket of at most {} of an axis; {} points in {} rounds\n"
-      "{}\n{}\n",
+      "{}\n{}\n{}{}",
       text_of(table_of_regions(map)), borders, format_count(map.borders.vertices.size()),
       solver::exact_number(map.flags.bracket), format_count(map.study.points()), map.study.rounds(),
-      shifts_sentence(map), islands_sentence(map));
+      shifts_sentence(map), islands_sentence(map), fmt::join(map.notes, "\n"),
+      map.notes.empty() ? "" : "\n");
 }
 
 // ---- Numbers ----
@@ -460,16 +476,6 @@ protocol::Table rows_of(const FoundMap& map) {
 
 std::string json_of(const FoundMap& map) {
   using Json = nlohmann::ordered_json;
-  Json vertices = Json::array();
-  for (const auto& vertex : map.borders.vertices) {
-    const auto at = values_of(map, vertex);
-    vertices.push_back({{"x", at.x},
-                        {"y", at.y},
-                        {"from", map.name_of(vertex.from)},
-                        {"to", map.name_of(vertex.to)},
-                        {"width", at.width},
-                        {"along", vertex.is_along_x ? "x" : "y"}});
-  }
   Json regions = Json::array();
   for (const auto& region : map.regions) {
     regions.push_back({{"name", region.name}, {"cells", region.cells}});
@@ -485,10 +491,11 @@ std::string json_of(const FoundMap& map) {
               {"y", map.plane.axes[1].key},
               {"of", map.flags.of},
               {"bracket", map.flags.bracket},
-              {"vertices", std::move(vertices)},
+              {"vertices", json_rows(rows_of(map))},
               {"curves", map.borders.curves},
               {"shifts", std::move(shifts)},
               {"regions", std::move(regions)},
+              {"notes", map.notes},
               {"study", map.study.name()},
               {"points", map.study.points()},
               {"rounds", map.study.rounds()}}
@@ -605,7 +612,8 @@ int run_map(const MapFlags& flags, Console& console) {
             {.tables = tables_of(map),
              .rows = rows_of(map),
              .json = json_of(map),
-             .figure = figure_of(map)});
+             .figure = figure_of(map),
+             .notes = map.notes});
     console.note(fmt::format("The points are the study {}.", study.name()));
     return kDone;
   });

@@ -76,10 +76,11 @@ void add_numbers(const CsvFile& file, double relative_sd, Measurements& measured
     const double sd = deviations[row].value_or(relative_sd * std::abs(*values[row]));
     const auto name = fmt::format("{}: {}", file.place_of_row(row), column);
     if (!(sd > 0.0)) {
-      throw InputError(fmt::format(
-          "{} has {}: fill in the column {}, or give --sd 1%", name,
-          deviations[row] ? "a standard deviation that is not positive" : "no standard deviation",
-          name_of_sd));
+      throw InputError(fmt::format("{} {}: fill in the column {}{}", name,
+                                   deviations[row] ? "has a standard deviation that is not positive"
+                                   : relative_sd > 0.0 ? "is 0, so --sd gives no standard deviation"
+                                                       : "has no standard deviation",
+                                   name_of_sd, relative_sd > 0.0 ? "" : ", or give --sd 1%"));
     }
     measured.numbers.push_back({row, measured.outputs.size() - 1, *values[row], sd, name});
   }

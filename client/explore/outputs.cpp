@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdint>
+#include <stdexcept>
 #include <variant>
 
 #include <spdlog/fmt/fmt.h>
@@ -58,6 +59,39 @@ double number_in(const protocol::Value& value) {
   }
   const auto* real = std::get_if<double>(&value);
   return real == nullptr ? kNaN : *real;
+}
+
+std::string first_failure(Source& source, const std::string& study) {
+  const auto found = source.query(fmt::format(
+      "SELECT point, error FROM runs WHERE study = {} AND status = 'failed' ORDER BY point LIMIT 1",
+      server::sql_text(study)));
+  return found.rows.empty()
+             ? ""
+             : fmt::format(" Point {} failed: {}.", std::get<std::int64_t>(found.rows[0][0]),
+                           protocol::visible(std::get<std::string>(found.rows[0][1])));
+}
+
+void ValueNotes::add(const std::string& output, std::uint64_t used, std::uint64_t all,
+                     bool varies) {
+  has_values = has_values || used > 0;
+  if (used == 0) {
+    notes.push_back(fmt::format("None of the {} rows has a number of {}.", all, output));
+  } else if (used == 1 || 2 * used < all) {
+    notes.push_back(fmt::format("{} has a value in only {} of the {} rows.", output, used, all));
+  }
+  if (used > 1 && !varies) {
+    notes.push_back(fmt::format("{} is the same in all {} rows.", output, used));
+  }
+}
+
+void ValueNotes::end(const std::string& first_failure) {
+  if (!notes.empty()) {
+    notes.back() += first_failure;
+  }
+  if (!has_values) {
+    constexpr const char* kTexts = " A text needs a condition, such as mode = 'sC sR'.";
+    throw std::runtime_error(notes.back() + (first_failure.empty() ? kTexts : ""));
+  }
 }
 
 }  // namespace oblique::client

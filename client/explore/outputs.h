@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "client/service/source.h"
 #include "proto/wire/chunk.h"
 
 namespace oblique::client {
@@ -21,5 +23,20 @@ std::vector<std::string> outputs_of_flag(std::string_view text, bool allows_text
 
 /// Returns the value as a number; NaN for NULL and for text.
 double number_in(const protocol::Value& value);
+
+/// Returns " Point 7 failed: " with the error of the first failed point; empty if none failed.
+std::string first_failure(Source& source, const std::string& study);
+
+/// Notes about outputs without numbers, with the same value everywhere, or with values in fewer
+/// than half of the rows.
+struct ValueNotes {
+  std::vector<std::string> notes = {};
+  bool has_values = false;
+
+  /// `used` of `all` rows have a value of the output. `varies`: by more than rounding errors.
+  void add(const std::string& output, std::uint64_t used, std::uint64_t all, bool varies);
+  /// Adds the text to the last note. Throws std::runtime_error if no output has a value.
+  void end(const std::string& first_failure);
+};
 
 }  // namespace oblique::client

@@ -28,6 +28,11 @@ Eigen::Map<const ArrayXXd> in_columns(std::span<const double> numbers, std::size
   return {numbers.data(), static_cast<Index>(size), static_cast<Index>(numbers.size() / size)};
 }
 
+/// Returns the largest rounding error of the finite elements.
+double rounding_of(const ArrayXXd& numbers) {
+  return kRounding * numbers.isFinite().select(numbers.abs(), 0.0).maxCoeff();
+}
+
 /// Returns the first number as an estimate, and as its interval the 2.5 % and 97.5 % percentiles of
 /// the other numbers. Ignores NaN among these.
 Estimate estimate_of(const ArrayXd& numbers) {
@@ -132,35 +137,41 @@ Sensitivity sobol_indices(std::span<const double> values, std::size_t inputs, st
     terms.row(2 + i) = (f.row(1) - f.row(2 + i)).square();
     terms.row(2 + d + i) = (f.row(0) - f.row(2 + i)).square();
   }
-  const auto measures_of = [d](const ArrayXd& means, double) {
+  const double rounding = rounding_of(f);
+  const auto measures_of = [d, rounding](const ArrayXd& means, double) {
     const double V = means[1] / 2.0 - means[0] * means[0] / 4.0;
-    ArrayXd indices = means.tail(2 * d) / (V > 0.0 ? 2.0 * V : kNaN);
+    ArrayXd indices = means.tail(2 * d) / (V > rounding * rounding ? 2.0 * V : kNaN);
     indices.head(d) = 1.0 - indices.head(d);
     return indices;
   };
   return estimated({"first", "total"}, inputs, terms, seed, measures_of);
 }
 
-Sensitivity morris_effects(std::span<const double> values, std::size_t inputs, std::uint64_t seed) {
+Sensitivity morris_effects(std::span<const double> values, std::span<const double> coordinates,
+                           std::size_t inputs, std::uint64_t seed) {
   const auto d = static_cast<Index>(inputs);
   const auto f = in_columns(values, inputs + 1);
+  const auto points = in_columns(coordinates, inputs);
   ArrayXXd effects(d, f.cols());
+  ArrayXd usual = ArrayXd::Zero(d);  // subtracted like f0 in `sobol_indices`
   for (Index row = 0; row < f.cols(); ++row) {
-    const auto trajectory = morris_trajectory(inputs, seed, static_cast<std::uint64_t>(row));
-    const auto points = in_columns(trajectory, inputs);
     for (Index step = 0; step < d; ++step) {
-      const ArrayXd change = points.col(step + 1) - points.col(step);
+      const Index at = row * (d + 1) + step;
+      const ArrayXd change = points.col(at + 1) - points.col(at);
       Index input = 0;
       change.abs().maxCoeff(&input);  // the coordinate that changes
       effects(input, row) = (f(step + 1, row) - f(step, row)) / change[input];
     }
+    usual = effects.col(row).isFinite().all() ? ArrayXd(effects.col(row)) : usual;
   }
   ArrayXXd terms(3 * d, f.cols());
-  terms << effects.abs(), effects.square(), effects;
-  const auto measures_of = [d](ArrayXd means, double rows) {
+  terms << effects.abs(), (effects.colwise() - usual).square(), effects.colwise() - usual;
+  const double rounding = rounding_of(f);
+  const auto measures_of = [&](ArrayXd means, double rows) {
     const ArrayXd variances = (means.segment(d, d) - means.tail(d).square()) * rows / (rows - 1.0);
     means.segment(d, d) = variances.max(0.0).sqrt();
-    return means;
+    means.tail(d) += usual;
+    return ArrayXd((means.abs() > rounding).select(means, 0.0));
   };
   return estimated({"mu_star", "sigma", "mu"}, inputs, terms, seed, measures_of);
 }

@@ -48,19 +48,21 @@ struct Sensitivity {
 ///   S_i  = 1 - sum_n (f(B) - f(A_B^i))^2 / (2 N V)
 ///   S_Ti =     sum_n (f(A) - f(A_B^i))^2 / (2 N V)
 ///
-/// V is the variance of all f(A) and f(B). If V is 0 or there are fewer than two rows, the indices
-/// are undefined. The ends of intervals are the 2.5 % and 97.5 % percentiles of 1,000 bootstrap
-/// replicates (B. Efron and R. J. Tibshirani, An Introduction to the Bootstrap, 1993). The
-/// intervals assume independent rows, so they are too wide for Sobol points.
+/// V is the variance of all f(A) and f(B). If V is 0 but for rounding errors, or there are fewer
+/// than two rows, the indices are undefined. The ends of intervals are the 2.5 % and 97.5 %
+/// percentiles of 1,000 bootstrap replicates (B. Efron and R. J. Tibshirani, An Introduction to the
+/// Bootstrap, 1993). The intervals assume independent rows, so they are too wide for Sobol points.
 Sensitivity sobol_indices(std::span<const double> values, std::size_t inputs, std::uint64_t seed);
 
 /// Measures of the elementary effects of each input on an output. `values` are the output at the
-/// points of rows 0, 1, ... of Morris' design, which was drawn with `seed`. An elementary effect is
+/// points of rows 0, 1, ... of Morris' design, and `coordinates` the coordinates of these points.
+/// They may be moved, as long as the coordinate that changes still changes. An elementary effect is
 /// the change of the output divided by the change of the coordinate. `mu_star` is the mean of the
 /// effects' magnitudes (F. Campolongo, J. Cariboni and A. Saltelli, An effective screening design
 /// for sensitivity analysis of large models, Environ. Model. Softw. 22 (2007)), `sigma` their
 /// standard deviation, and `mu` their mean. Intervals are as in `sobol_indices`. Fewer than two
-/// rows leave the measures undefined.
-Sensitivity morris_effects(std::span<const double> values, std::size_t inputs, std::uint64_t seed);
+/// rows leave the measures undefined. Measures that are only rounding errors of the output are 0.
+Sensitivity morris_effects(std::span<const double> values, std::span<const double> coordinates,
+                           std::size_t inputs, std::uint64_t seed);
 
 }  // namespace oblique::client

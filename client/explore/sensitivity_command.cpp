@@ -71,6 +71,9 @@ struct SensitivityProblem {
 SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& check_reach) {
   check(flags.answer);
   const bool is_sobol = choice_of("--method", flags.method, kMethods) == 0;
+  if (!is_sobol && flags.interval != SensitivityFlags().interval) {
+    throw solver::InputError("--interval is for --method sobol: morris solves --rows trajectories");
+  }
   const std::uint64_t usual_rows = is_sobol ? 512 : 32;
   SensitivityProblem problem{.is_sobol = is_sobol,
                              .first_rows = std::bit_ceil(flags.rows > 0 ? flags.rows : usual_rows),
@@ -102,9 +105,12 @@ SensitivityProblem problem_of(const SensitivityFlags& flags, const ReachCheck& c
   return problem;
 }
 
-/// The points of rows [begin, end) of the design.
-protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t begin,
-                              std::uint64_t end) {
+/// The points of rows [begin, end) of the design, and their coordinates. That of a level is its
+/// distance from the least level, where the largest level has 1; that of another value is its
+/// probability.
+std::pair<protocol::Block, std::vector<double>> rows_of_design(const SensitivityProblem& problem,
+                                                               std::uint64_t begin,
+                                                               std::uint64_t end) {
   const std::size_t d = problem.inputs.size();
   std::vector<double> coordinates;
   for (std::uint64_t number = begin; number < end; ++number) {
@@ -119,17 +125,24 @@ protocol::Block block_of_rows(const SensitivityProblem& problem, std::uint64_t b
     if (!protocol::is_drawn(axis)) {
       continue;
     }
-    const auto levels = static_cast<double>(protocol::axis_size(axis));
+    std::vector<double> levels;
+    for (std::uint64_t i = 0; !axis.has_distribution() && i < protocol::axis_size(axis); ++i) {
+      levels.push_back(protocol::axis_value(axis, i));
+    }
+    const auto [least, largest] = std::minmax_element(levels.begin(), levels.end());
     std::vector<double> values;
     for (std::size_t i = input++; i < coordinates.size(); i += d) {
-      values.push_back(
-          axis.has_distribution()
-              ? sampling::Quantiles(axis).value_at(coordinates[i])
-              : protocol::axis_value(axis, static_cast<std::uint64_t>(coordinates[i] * levels)));
+      double& at = coordinates[i];
+      if (levels.empty()) {
+        values.push_back(sampling::Quantiles(axis).value_at(at));
+      } else {
+        values.push_back(levels[static_cast<std::size_t>(at * static_cast<double>(levels.size()))]);
+        at = (values.back() - *least) / (*largest - *least);
+      }
     }
     axis = protocol::listed_axis(protocol::axis_key(axis.key()), values);
   }
-  return block;
+  return {block, coordinates};
 }
 
 /// Prints a note if falls need most of the time of the points of `block`.
@@ -157,7 +170,7 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
   std::vector<std::vector<double>> values(problem.outputs.size());
   std::string of_rounds;
   for (std::uint64_t begin = 0, end = problem.first_rows;; begin = end, end *= 2) {
-    const auto block = block_of_rows(problem, begin, end);
+    const auto [block, coordinates] = rows_of_design(problem, begin, end);
     if (begin == 0) {
       note_falls(console, problem, block);
     }
@@ -169,8 +182,9 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
       for (const auto& row : table.rows) {
         values[i].push_back(number_in(row[i]));
       }
-      found.push_back((problem.is_sobol ? sobol_indices : morris_effects)(
-          values[i], problem.inputs.size(), kSeed));
+      found.push_back(problem.is_sobol
+                          ? sobol_indices(values[i], problem.inputs.size(), kSeed)
+                          : morris_effects(values[i], coordinates, problem.inputs.size(), kSeed));
       for (const Measure& measure : found.back().measures) {
         for (const Estimate& estimate : measure.of_inputs) {
           half_width = std::fmax(half_width, estimate.half_width());  // ignores NaN
@@ -194,7 +208,8 @@ std::vector<Sensitivity> sensitivities_of(Console& console, const SensitivityPro
   }
 }
 
-/// The answer has a row, and two bars with intervals, for each output and input.
+/// The answer has a row, and two bars with intervals, for each output and input. Throws
+/// std::runtime_error if no output has a row.
 Answer sensitivity_answer(const SensitivityProblem& problem, const std::vector<Sensitivity>& found,
                           const GrowingStudy& study) {
   protocol::Table table{.columns = {"output", "input"}};
@@ -207,12 +222,15 @@ Answer sensitivity_answer(const SensitivityProblem& problem, const std::vector<S
       .subtitle = fmt::format("{} points, 95 % intervals", format_count(study.points())),
       .columns = 2,
       .panel_size = {400.0, 90.0 + 26.0 * static_cast<double>(problem.inputs.size())}};
+  ValueNotes notes;
   for (std::size_t output = 0; output < found.size(); ++output) {
     const auto& [measures, rows, dropped] = found[output];
+    bool varies = false;
     for (std::size_t i = 0; i < problem.inputs.size(); ++i) {
       protocol::Row row{problem.outputs[output], problem.inputs[i]};
       for (const Measure& measure : measures) {
         append_values(row, measure.of_inputs[i]);
+        varies = varies || std::abs(measure.of_inputs[i].value) > 0.0;
       }
       row.insert(row.end(), {static_cast<std::int64_t>(rows), static_cast<std::int64_t>(dropped)});
       table.rows.push_back(std::move(row));
@@ -231,12 +249,14 @@ Answer sensitivity_answer(const SensitivityProblem& problem, const std::vector<S
       panel.x.span(range, 0.02);
       figure.panels.push_back(std::move(panel));
     }
+    notes.add(problem.outputs[output], rows, rows + dropped, varies);
   }
+  notes.end(first_failure(study.source(), study.name()));
   auto answer = answer_of({{"study", study.name()},
                            {"method", problem.is_sobol ? kMethods[0] : kMethods[1]},
                            {"inputs", problem.inputs},
                            {"points", study.points()}},
-                          std::move(table), std::move(figure));
+                          std::move(table), std::move(figure), notes.notes);
   answer.tables += problem.is_sobol ? "" : kMorrisNote;
   return answer;
 }

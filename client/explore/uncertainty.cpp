@@ -1,6 +1,7 @@
 #include "client/explore/uncertainty.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
@@ -13,10 +14,11 @@ namespace {
 /// The 97.5 % quantile of the standard normal distribution.
 constexpr double kZ = 1.959963984540054;
 
-/// Differences from the mean, exactly 0 for constant values, whose mean may be rounded.
+/// Differences from the mean, exactly 0 for values that differ only by rounding errors.
 Eigen::ArrayXd deviations(std::span<const double> values) {
   const Eigen::Map<const Eigen::ArrayXd> x(values.data(), std::ssize(values));
-  return x - ((x == x[0]).all() ? x[0] : x.mean());
+  const bool varies = x.maxCoeff() - x.minCoeff() > kRounding * x.abs().maxCoeff();
+  return varies ? Eigen::ArrayXd(x - x.mean()) : Eigen::ArrayXd::Zero(x.size());
 }
 
 /// The probability of k hits in n draws that hit with probability p.
@@ -27,10 +29,23 @@ double binomial_probability(double n, double k, double p) {
 
 }  // namespace
 
+// From five degrees of freedom on, the expansion z + g_1/n + ... + g_4/n^4 with its coefficients at
+// z = 1.96: M. Abramowitz and I. A. Stegun, Handbook of Mathematical Functions (1964), 26.7.5. Its
+// relative error is below 1.1e-4.
+double t_quantile(std::uint64_t degrees) {
+  constexpr std::array kFew{12.7062047, 4.3026527, 3.1824463, 2.7764451};
+  const auto n = static_cast<double>(degrees);
+  return degrees <= kFew.size()
+             ? kFew.at(degrees - 1)
+             : kZ + (2.3722712 + (2.8224986 + (2.5558497 + 1.5895341 / n) / n) / n) / n;
+}
+
 Estimate mean_of(std::span<const double> values) {
   const auto n = static_cast<double>(values.size());
   const double mean = std::accumulate(values.begin(), values.end(), 0.0) / n;
-  const double half = kZ * deviation_of(values) / std::sqrt(n);
+  const double half = values.size() < 2
+                          ? kNaN
+                          : t_quantile(values.size() - 1) * deviation_of(values) / std::sqrt(n);
   return {mean, mean - half, mean + half};
 }
 

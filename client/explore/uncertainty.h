@@ -9,7 +9,11 @@
 // values do not determine is NaN.
 namespace oblique::client {
 
-/// The mean, with the interval mean -+ 1.96 sd/sqrt(n), which holds for more than about 30 values.
+/// The 97.5 % quantile of Student's t distribution with `degrees` >= 1 degrees of freedom.
+double t_quantile(std::uint64_t degrees);
+
+/// The mean, with the interval mean -+ t sd/sqrt(n), t with n - 1 degrees of freedom. It holds for
+/// normal values, and for more than about 30 other values.
 Estimate mean_of(std::span<const double> values);
 /// The standard deviation sqrt(sum (x - mean)^2/(n - 1)).
 double deviation_of(std::span<const double> values);

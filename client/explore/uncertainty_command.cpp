@@ -102,7 +102,7 @@ std::vector<Statistic> statistics_of(const SampledStudy& study, std::size_t outp
 /// Adds the statistics of an output to the table. If its values are texts, their probabilities are
 /// in falling order. If they are numbers, adds a line at each quantile to the histogram.
 void add_output(const SampledStudy& study, std::size_t output, protocol::Table& table,
-                plot::Panel& histogram) {
+                plot::Panel& histogram, ValueNotes& notes) {
   const std::size_t points = study.columns.front().numbers.size();
   const auto statistics = statistics_of(study, output, points);
   std::vector<protocol::Row> rows;
@@ -115,8 +115,15 @@ void add_output(const SampledStudy& study, std::size_t output, protocol::Table& 
       rows[row].push_back(value_of(of_first[row].second.value));
     }
   }
+  const auto& column = study.columns[study.inputs.size() + output];
+  std::uint64_t used = points;
+  for (std::size_t row = 0; row < points; ++row) {
+    used -= column.is_null(row) ? 1U : 0U;
+  }
+  notes.add(study.outputs[output], used, points,
+            column.has_texts() || statistics[1].second.value != 0.0);
   histogram.title = study.outputs[output];
-  if (study.columns[study.inputs.size() + output].has_texts()) {
+  if (column.has_texts()) {
     std::stable_sort(rows.begin(), rows.end(), [](const auto& a, const auto& b) {
       return std::get<double>(a[2]) > std::get<double>(b[2]);
     });
@@ -172,18 +179,23 @@ int uncertainty(const UncertaintyFlags& flags, Console& console) {
   table.columns.insert(table.columns.end(), {"half", "quarter", "eighth"});
   plot::Figure figure{.title = flags.study,
                       .columns = std::min<std::size_t>(2, study.outputs.size())};
+  ValueNotes notes;
   for (std::size_t i = 0; i < study.outputs.size(); ++i) {
-    histogram.histogram = study.outputs[i];
-    auto drawn = plot::figure_of(*source, shape, histogram, [](const std::string&) {});
-    add_output(study, i, table, figure.panels.emplace_back(std::move(drawn.panels.front())));
+    auto& panel = figure.panels.emplace_back();
+    if (wants_picture(flags.answer)) {
+      histogram.histogram = study.outputs[i];
+      panel = plot::figure_of(*source, shape, histogram, [](const std::string&) {}).panels.front();
+    }
+    add_output(study, i, table, panel, notes);
   }
+  notes.end(first_failure(*source, flags.study));
   put_out(console, flags.answer,
           answer_of({{"study", flags.study},
                      {"sample", protocol::name_of(recipe.blocks(0).sample().kind())},
                      {"inputs", study.inputs},
                      {"points", status.points()},
                      {"failed", status.failed()}},
-                    std::move(table), std::move(figure)));
+                    std::move(table), std::move(figure), notes.notes));
   return kDone;
 }
 

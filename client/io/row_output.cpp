@@ -48,7 +48,7 @@ std::string pager_command() {
       return *command == "cat" ? std::string() : *command;
     }
   }
-  return "less -FRSX";
+  return "if command -v less >/dev/null; then less -FRSX; else cat; fi";
 }
 
 [[noreturn]] void refuse(std::string_view flag, const std::string& path, int error) {
@@ -261,9 +261,13 @@ void StandardOutput::start_pager() {
   Pipe pipe;
   pager_ = std::make_unique<ChildProcess>(ChildSettings{
       .program = "sh",
-      // If the pager is not installed, `cat` prints the text instead.
-      .arguments = {"-c", "command -v ${0%% *} >/dev/null 2>&1 || exec cat; eval \"$0\"",
-                    pager_command_},
+      // `cat` prints the text if the pager is not installed (127), or if the command has only
+      // blanks and assignments, such as LESS=-S.
+      .arguments =
+          {"-c",
+           "for word in $0; do case $word in *=*) ;; *) eval \"$0\"; [ $? = 127 ] || exit; "
+           "break; esac; done; exec cat",
+           pager_command_},
       .show_errors = true,
       .stays_in_our_group = true,
       .input_from = pipe.read.number(),

@@ -133,7 +133,7 @@ RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& 
   if (stop.requested()) {
     throw Interrupted("stopped");
   }
-  const Tell tell = [&console](const std::string& sentence) { console.note(sentence); };
+  const Tell tell = tell_errors(console);
   const auto query = [&](const std::string& sql) { return connection.query(sql, tell); };
   end.rows = connection.chunks(request_for({.study = study.name, .limit = settings.rows}), tell);
   end.exit_code = print_end(console, end.status, query);
@@ -246,7 +246,9 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
 void EmbeddedService::start_worker(const ServiceSettings& settings) {
   // The workers share the cores, and the memory for cached falls.
   const auto workers = static_cast<unsigned>(settings.workers);
-  const unsigned threads = std::max(1U, protocol::usable_processors().count / workers);
+  const unsigned cores = protocol::usable_processors().count;
+  const unsigned threads =
+      std::max(1U, cores / workers + (workers_.size() < cores % workers ? 1U : 0U));
   const std::uint64_t all_bytes =
       settings.fall_memory_bytes != 0
           ? settings.fall_memory_bytes

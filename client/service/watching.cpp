@@ -61,9 +61,9 @@ std::string WaitMessages::update(const protocol::StudyStatus& status, Seconds el
 protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
                                   protocol::StopSignals& stop) {
   Progress progress(console);
-  const Tell tell = [&progress, &console](const std::string& sentence) {
+  const Tell tell = [&progress, tell = tell_errors(console)](const std::string& sentence) {
     progress.finish();
-    console.note(sentence);
+    tell(sentence);
   };
   const auto start = Clock::now();
   WaitMessages messages;
@@ -78,7 +78,8 @@ protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
                      .left_out = status.left_out(),
                      .elapsed_s = elapsed.count()});
     if (const auto sentence = messages.update(status, elapsed); !sentence.empty()) {
-      tell(sentence);
+      progress.finish();
+      console.note(sentence);
     }
     const bool over =
         (status.state() != "running" && status.state() != "paused") || completed == status.points();
@@ -88,6 +89,12 @@ protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
       return status;
     }
   }
+}
+
+Tell tell_errors(Console& console) {
+  return [&console](const std::string& sentence) {
+    console.errors() << protocol::visible(sentence) << '\n';
+  };
 }
 
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell) {

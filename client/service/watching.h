@@ -41,6 +41,9 @@ using AskStatus = std::function<protocol::StudyStatus(const Tell& tell)>;
 protocol::StudyStatus watch_study(Console& console, const AskStatus& ask,
                                   protocol::StopSignals& stop);
 
+/// Returns a Tell that also writes with --quiet, because a server may be away for ever.
+Tell tell_errors(Console& console);
+
 /// Returns the status of the study called `name`. Throws std::runtime_error if it does not exist.
 /// With a `tell`, waits for an unreachable server.
 protocol::StudyStatus study_named(Source& source, const std::string& name, const Tell& tell = {});

@@ -41,6 +41,10 @@ oblique submit "$file" --name "$study"
 oblique autoscale slurm --name "$jobs" --max "$most" ${SBATCH_ARGS:+--sbatch-args "$SBATCH_ARGS"} 2> autoscale.log &
 scaling=$!
 
-oblique watch "$study"
+# Exit codes: 0 all points are solved, 1 some are not. Those that are solved are exported.
+code=0
+oblique watch "$study" || code=$?
+[ "$code" -le 1 ] || exit "$code"
 oblique query "$study" --format csv > "$study.csv"
 echo "$(tail -n +2 "$study.csv" | wc -l) results in $study.csv"
+exit "$code"

@@ -105,6 +105,24 @@ class StudyFromAScript(Recipe):
         self.run_in_folder("sh", "study.sh", "", code=2, OBLIQUE_SERVER=url)
 
 
+class CampaignOnACluster(Recipe):
+    def test_it_exports_the_results_and_fails_if_a_point_failed(self):
+        programs = self.folder / "programs"
+        programs.mkdir()
+        oblique = """case $1 in
+            keygen) mkdir keys ;;
+            autoscale) exec sleep 1000 ;;
+            watch) exit 1 ;;
+            query) printf 'point,mu\\n0,0.4\\n' ;;
+            esac"""
+        for name, script in {"oblique": oblique, "oblique-server": "exec sleep 1000", "scancel": "", "squeue": ""}.items():
+            (programs / name).write_text(f"#!/bin/sh\n{script}\n")
+            (programs / name).chmod(0o755)
+        printed = self.run_in_folder("sh", "campaign.sh", "some.toml", code=1, PATH=f"{programs}:/usr/bin:/bin")
+        self.assertEqual(printed, "1 results in some.csv\n")
+        self.assertEqual([row["mu"] for row in self.rows_of("some.csv")], ["0.4"])
+
+
 class PictureOfARunningStudy(Recipe):
     NEEDS = "matplotlib", "pandas"
 

@@ -81,6 +81,9 @@ class Database:
     def __repr__(self) -> str:
         return f"oblique.Database({self.file!r})"
 
+    def __reduce__(self) -> tuple[Any, ...]:  # a copy opens the file again
+        return type(self), (self.file,)
+
     def query(
         self,
         study: str,

@@ -11,7 +11,7 @@ import os
 import pathlib
 import shutil
 import subprocess
-from typing import Any, Dict, List, Mapping, Optional, Sequence
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -34,14 +34,15 @@ def program() -> str:
 def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     """The JSON that ``oblique VERB [STUDY] --flag value ... --format json`` prints.
 
-    ``tip_mass=0.1`` is ``--tip-mass 0.1``, a list or tuple repeats the flag, True is a flag without
-    a value; None and False leave it out. Raises ValueError for wrong usage and RuntimeError for
-    other failures, with the sentences of the program.
+    ``tip_mass=0.1`` is ``--tip-mass 0.1``; a list, tuple, range or array ``mu=[0.1, 0.4]`` is
+    ``--mu 0.1,0.4``. A list for ``fit`` repeats the flag. True is a flag without a value; None and
+    False leave it out. Raises ValueError for wrong usage and RuntimeError for other failures, with
+    the sentences of the program.
     """
     words = [program(), verb, *([] if study is None else [study]), "--format", "json", "--quiet"]
     for name, value in flags.items():
         flag = "--" + name.replace("_", "-")
-        for each in value if isinstance(value, (list, tuple)) else [value]:
+        for each in value if name == "fit" else [_plain(name, value)]:
             if each is True:
                 words.append(flag)
             elif each is not None and each is not False:
@@ -50,6 +51,18 @@ def run(verb: str, study: Optional[str] = None, **flags: Any) -> Any:
     if ended.returncode != 0:
         raise (ValueError if ended.returncode == 2 else RuntimeError)(ended.stderr.strip())
     return json.loads(ended.stdout)
+
+
+def _plain(name: str, value: Any) -> Any:
+    """A single value as a Python object; several values as a text, separated by commas."""
+    if isinstance(value, Iterable) and not isinstance(value, (str, np.ndarray)):
+        value = list(value)
+    values = np.asarray(value, dtype=object)
+    if values.size == 0 or "" in values.ravel():
+        raise ValueError(f"{name}: the value is empty")
+    if values.ndim > 1:
+        raise ValueError(f"{name}: the values must be in one row")
+    return np.asarray(value).item() if values.ndim == 0 else ",".join(str(each) for each in values)
 
 
 def _column(rows: List[Dict[str, Any]], name: str, kind: Any = float) -> Any:

@@ -1,4 +1,5 @@
 // Runs `oblique query` on a database file.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -30,6 +31,26 @@ class DatabaseQuery : public testing::Test {
 
   test::TemporaryFolder folder_;
 };
+
+TEST_F(DatabaseQuery, TheCommandOfAPagerMayBeginWithBlanksAndAssignments) {
+  const auto lines_with = [this](const std::string& pager) {
+    const std::string command =
+        test::client_program() +
+        " sql 'WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n LIMIT 100) "
+        "SELECT i FROM n'";
+    test::Process shown(folder_, "/usr/bin/script", {"-qec", command, "/dev/null"},
+                        {{"PAGER", pager}, {"TERM", "xterm"}});
+    EXPECT_EQ(shown.wait(), 0) << shown.err();
+    const std::string out = shown.out();
+    return std::count(out.begin(), out.end(), '\n');
+  };
+  for (const std::string pager : {" head -n 1 ", "LESS=-S head -n 1", "LESS='-R -S' head -n 1"}) {
+    EXPECT_EQ(lines_with(pager), 1) << pager;
+  }
+  for (const std::string pager : {" ", "LESS=-S", "no-such-pager"}) {
+    EXPECT_GT(lines_with(pager), 100) << pager;
+  }
+}
 
 TEST_F(DatabaseQuery, AStatementHasATimeLimit) {
   const auto outcome = run_command(

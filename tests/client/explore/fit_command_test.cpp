@@ -15,13 +15,17 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
-TEST(FitCoverage, IsThatOf95PercentIntervals) {
-  const auto coverage = test::fit_coverage(50, 2);
-  EXPECT_EQ(coverage.fits, 50);
-  // If intervals cover the truth in 95 % of fits, the probability of fewer than 42 in 50 is 0.1 %.
-  EXPECT_GE(coverage.k, 42);
-  EXPECT_GE(coverage.eta2, 42);
+TEST(FitCoverage, IsThatOf95PercentIntervalsAlsoIfTheDeviationsAreScaled) {
+  for (const bool is_scaled : {false, true}) {
+    const auto coverage = test::fit_coverage(50, 2, is_scaled);
+    EXPECT_EQ(coverage.fits, 50);
+    // If intervals cover the truth in 95 % of fits, fewer than 42 in 50 have a probability of 0.1
+    // %.
+    EXPECT_GE(coverage.k, 42) << is_scaled;
+    EXPECT_GE(coverage.eta2, 42) << is_scaled;
+  }
 }
 
 class FitCommand : public ::testing::Test {
@@ -71,6 +75,64 @@ TEST_F(FitCommand, FindsTheParametersOfMeasurements) {
   EXPECT_THAT(again.err, HasSubstr("Continuing"));
 }
 
+TEST_F(FitCommand, SaysWhichValuesFitAsWellAsABound) {
+  std::ofstream(folder_.file("measured.csv"))
+      << "H,mu,vn_out_m_s\n0.8,0.4,1.1781\n0.8,1.2,1.7955\n1,0.4,1.9232\n1,1.2,0.9185\n";
+  const auto of_e = fit({"--fit", "e=0.5:1", "--sd", "1%", "--quiet"}).out;
+  EXPECT_THAT(of_e, HasSubstr("\ne is at its bound 1; values down to 0.976"));
+  EXPECT_THAT(of_e, AllOf(Not(HasSubstr("no effect")), Not(HasSubstr("beyond"))));
+  const auto both = fit({"--fit", "e=0.5:1", "--fit", "k=2.8e7:1e8", "--sd", "1%", "--quiet"}).out;
+  EXPECT_THAT(both, HasSubstr("\ne is at its bound 1; values down to 0.99"));
+  EXPECT_THAT(both, HasSubstr("\nk is at its bound 2.8e+07; values up to 2.80"));
+  EXPECT_THAT(both, HasSubstr("fit as well. Values beyond the bound may fit better.\n"));
+}
+
+TEST_F(FitCommand, NotesThatAScaleBelow1NarrowsTheAnswer) {
+  measure();
+  const std::vector<std::string> flags{"--e", "1", "--fit", "k=1e7:1e8", "--sd", "1%"};
+  auto scaled = flags;
+  scaled.emplace_back("--scale");
+  EXPECT_THAT(fit(scaled).out, HasSubstr("so --scale narrows sd to 0.001 of its size"));
+  EXPECT_THAT(fit(flags).out, Not(HasSubstr("--scale")));
+}
+
+TEST_F(FitCommand, WithoutAFileRefusesFlagsThatItWouldIgnore) {
+  for (const std::vector<std::string>& flags :
+       std::vector<std::vector<std::string>>{{"--scale"},
+                                             {"--db", "x.db"},
+                                             {"--workers", "1"},
+                                             {"--name", "x"},
+                                             {"--server", "x"},
+                                             {"--keys", "x"},
+                                             {"--timeout", "5"},
+                                             {"--no-reuse"},
+                                             {"--fall-memory", "2GB"},
+                                             {"--fit", "k=1e7:1e8"},
+                                             {"--sd", "1%"},
+                                             {"--k", "2e7"},
+                                             {"--preset", "paper"}}) {
+    auto words = flags;
+    words.insert(words.begin(), "fit");
+    const auto refused = oblique(words);
+    EXPECT_EQ(refused.exit_code, 2) << flags[0];
+    EXPECT_THAT(refused.err, HasSubstr(flags[0] + " needs measured numbers"));
+  }
+  for (const std::string picture : {"fit.svg", "fit.gp", "fit.png", "fit.pdf"}) {
+    const auto refused = oblique({"fit", "--out", picture});
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err,
+                HasSubstr("--out " + picture + ": the fit to the paper's numbers has"));
+  }
+}
+
+TEST_F(FitCommand, SaysWhichPointFailsIfTheModelHasNoOutput) {
+  std::ofstream(folder_.file("measured.csv")) << "H,mu,fn_peak_N\n1e-9,0.4,5058\n";
+  const auto failed = fit({"--e", "1", "--fit", "k=1e7:1e8", "--sd", "1%", "--quiet"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.err,
+              HasSubstr("no such output at the start; give other starts. Point 0 failed"));
+}
+
 TEST_F(FitCommand, ReportsWrongInput) {
   std::ofstream(folder_.file("measured.csv")) << "H,mu,fn_peak_N\n1,0.4,5058\n";
   const auto error_of = [&](const std::vector<std::string>& flags) {
@@ -85,6 +147,8 @@ TEST_F(FitCommand, ReportsWrongInput) {
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8"}),
               HasSubstr("fn_peak_N has no standard deviation"));
   EXPECT_THAT(error_of({"--fit", "k=1e7:1e8", "--sd", "1%"}), HasSubstr("--e is missing"));
+  EXPECT_THAT(error_of({"--fit", "k=1e7:1e8", "--e", "1", "--from", "printed"}),
+              HasSubstr("--from"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "H=0.5:1", "--sd", "1%"}),
               HasSubstr("H is given twice"));
   EXPECT_THAT(error_of({"--e", "1,0.9", "--fit", "k=1e7:1e8", "--sd", "1%"}),

@@ -68,14 +68,14 @@ bool covers(const Estimate& estimate, double truth) {
 
 }  // namespace
 
-Coverage fit_coverage(int fits, std::uint64_t seed,
-                      const std::function<void(const Coverage&)>& after_each) {
+Coverage fit_coverage(int fits, std::uint64_t seed, bool is_scaled) {
   const auto falls = std::make_shared<solver::FallCache>();
   const VectorXd truth{{2.7e7, 1.2463}};
   const VectorXd exact = peak_forces({truth}, falls).front();
   FitProblem problem;
   problem.unknowns = {{"k", 1e7, 1e8, 4e7}, {"eta2", 1.0, 1.8, 1.4}};
-  problem.sd = kRelativeDeviation * exact;
+  const VectorXd noise = kRelativeDeviation * exact;
+  problem.sd = (is_scaled ? 3.0 : 1.0) * noise;
   problem.names.assign(static_cast<std::size_t>(exact.size()), "a synthetic number");
   problem.evaluate = [&](const std::vector<VectorXd>& points, const std::string& /*what*/) {
     return peak_forces(points, falls);
@@ -86,15 +86,12 @@ Coverage fit_coverage(int fits, std::uint64_t seed,
   while (coverage.fits < fits) {
     problem.measured = exact;
     for (Index i = 0; i < exact.size(); ++i) {
-      problem.measured[i] += normal(random) * problem.sd[i];
+      problem.measured[i] += normal(random) * noise[i];
     }
-    const Fit found = client::fit(problem);
+    const Fit found = client::fit(problem, is_scaled);
     ++coverage.fits;
     coverage.k += covers(found.unknowns[0].estimate, truth[0]) ? 1 : 0;
     coverage.eta2 += covers(found.unknowns[1].estimate, truth[1]) ? 1 : 0;
-    if (after_each) {
-      after_each(coverage);
-    }
   }
   return coverage;
 }

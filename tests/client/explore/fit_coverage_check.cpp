@@ -14,8 +14,10 @@ int main(int argc, char** argv) {
   std::uint64_t seed = 1;
   app.add_option("--fits", fits, "number of fits")->capture_default_str();
   app.add_option("--seed", seed, "of the noise")->capture_default_str();
+  bool is_scaled = false;
+  app.add_flag("--scale", is_scaled, "fit with a wrong deviation and scale it");
   CLI11_PARSE(app, argc, argv);
-  const auto coverage = oblique::test::fit_coverage(fits, seed);
+  const auto coverage = oblique::test::fit_coverage(fits, seed, is_scaled);
   const auto percent = [&](int covered) { return 100.0 * covered / coverage.fits; };
   fmt::print("{} fits: k {:.1f} %, eta2 {:.1f} %\n", coverage.fits, percent(coverage.k),
              percent(coverage.eta2));

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -106,10 +108,12 @@ TEST(Fit, ScalesDeviationsAndIntervalsByChi2WhereAsked) {
   const Fit scaled = fit(line_problem(), true);
   const double factor = std::sqrt(plain.minimum.chi2 / 2.0);
   EXPECT_NEAR(scaled.scale, factor * factor, 1e-9);
+  // The 97.5 % quantile of Student's t with two degrees of freedom is 4.3027, the normal one 1.96.
+  const double wider = factor * 4.3027 / 1.95996;
   for (const std::size_t i : {0U, 1U}) {
     EXPECT_NEAR(scaled.unknowns[i].sd, factor * plain.unknowns[i].sd, 1e-6);
     EXPECT_NEAR(scaled.unknowns[i].estimate.to - scaled.unknowns[i].estimate.value,
-                factor * (plain.unknowns[i].estimate.to - plain.unknowns[i].estimate.value), 0.02);
+                wider * (plain.unknowns[i].estimate.to - plain.unknowns[i].estimate.value), 0.02);
   }
 }
 
@@ -155,6 +159,60 @@ TEST(Fit, KeepsAnUnknownAtABoundBehindWhichTheMinimumIs) {
   const double variance = 0.25 * 4.0 / 20.0;
   const double end = 0.85 + std::sqrt((1.5 - 0.85) * (1.5 - 0.85) + 3.84 * variance);
   EXPECT_NEAR(found.unknowns[1].estimate.to, end, 0.01);
+}
+
+// A line through normal noise of the standard deviation 0.2, which the fit takes for 0.5. Of 400
+// intervals of 95 %, 380 are expected to cover the slope with a standard deviation of 4.4; with the
+// normal quantile instead of Student's, 325.
+TEST(Fit, ScaledIntervalsOfFewNumbersCoverTheTruthAsOftenAsTheySay) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal(0.0, 0.2);
+  auto problem = line_problem();
+  int covered = 0;
+  for (int i = 0; i < 400; ++i) {
+    for (Eigen::Index t = 0; t < problem.measured.size(); ++t) {
+      problem.measured[t] = 1.0 + 0.5 * static_cast<double>(t) + normal(random);
+    }
+    const auto slope = fit(problem, true).unknowns[1].estimate;
+    covered += slope.from <= 0.5 && 0.5 <= slope.to ? 1 : 0;
+  }
+  EXPECT_NEAR(covered, 380, 22);
+}
+
+TEST(Fit, CountsAnUnknownAtABoundAsADegreeOfFreedom) {
+  auto problem = line_problem();
+  problem.unknowns[1] = {"b", 1.5, 5.0, 2.0};
+  const Fit found = fit(problem, true);
+  EXPECT_EQ(found.degrees_of_freedom, 3U);
+  EXPECT_NEAR(found.scale, found.minimum.chi2 / 3.0, 1e-12);
+}
+
+TEST(Fit, JudgesTheEffectOfAnUnknownAtEitherBoundByAStepInwards) {
+  for (const auto& [from, to] : {std::pair{1.5, 5.0}, {-5.0, 0.2}}) {
+    auto problem = line_problem();  // without the bound, b would be 0.85
+    problem.unknowns[1] = {"b", from, to, (from + to) / 2.0};
+    problem.unknowns.push_back({"unused", 0.0, 1.0, 0.5});
+    const Fit found = fit(problem);
+    EXPECT_TRUE(found.unknowns[1].is_at_bound) << from;
+    EXPECT_TRUE(found.unknowns[1].has_effect) << from;
+    EXPECT_FALSE(found.unknowns[2].has_effect) << from;
+  }
+}
+
+// chi2 sd^2 = 0.19 (a - 0.9)^2 + (b - 1.8 - 0.9 (a - 1))^2 with b >= 2. It is least at a = 1.161
+// and the bound of b, where derivatives with respect to the angle of b vanish. From a = 1.222 on,
+// the best b lies within the bounds, and chi2 sd^2 is 0.19 (a - 0.9)^2.
+TEST(Fit, ProfilesOverAnotherUnknownThatLeavesItsBound) {
+  const double sd = 0.2;
+  const auto problem = problem_of(
+      {{"a", 1.0, 10.0, 3.0}, {"b", 2.0, 10.0, 4.0}}, VectorXd::Zero(2), sd, [](const VectorXd& p) {
+        return VectorXd{{std::sqrt(0.19) * (p[0] - 0.9), p[1] - 1.8 - 0.9 * (p[0] - 1.0)}};
+      });
+  const Fit found = fit(problem);
+  EXPECT_TRUE(found.unknowns[1].is_at_bound);
+  EXPECT_NEAR(found.unknowns[0].estimate.value, 1.161, 1e-3);
+  const double at_end = found.minimum.chi2 * sd * sd + 3.8415 * sd * sd;
+  EXPECT_NEAR(found.unknowns[0].estimate.to, 0.9 + std::sqrt(at_end / 0.19), 0.01);
 }
 
 TEST(Fit, NamesUnknownsOfWhichOnlyTheProductIsDetermined) {

@@ -1,5 +1,6 @@
 #include "client/explore/growing_study.h"
 
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <optional>
@@ -118,6 +119,38 @@ TEST_F(GrowingStudyTest, ReportsMissingRowsOfAStudyThatWasRenamed) {
   connection.change("growing", protocol::STUDY_CHANGE_RENAME,
                     connection.status("growing").at(0).study_id(), "renamed");
   EXPECT_THROW(again.solve(drops({0.5, 0.6}), "fn_peak_N", "round 2"), std::runtime_error);
+}
+
+TEST_F(GrowingStudyTest, ContinuesBlocksThatDifferByRoundingErrors) {
+  const auto first = open().solve(drops({1.0, 0.5}), "H, fn_peak_N", "round 1");
+  auto again = open();
+  const auto nearly = drops({std::nextafter(1.0, 2.0), std::nextafter(0.5, 0.0)});
+  EXPECT_EQ(again.solve(nearly, "H, fn_peak_N", "round 1").rows, first.rows);
+  again.solve(drops({0.75}), "fn_peak_N", "round 2");
+  EXPECT_EQ(solved(), 3.0);
+  auto other = open();
+  EXPECT_THROW(other.solve(drops({1.0 + 1e-9, 0.5}), "H", "round 1"), solver::InputError);
+}
+
+TEST_F(GrowingStudyTest, GrowsSideBySideWithAnEqualExploration) {
+  auto ours = open();
+  auto other = open();
+  const auto first = other.solve(drops({1.0}), "fn_peak_N", "round 1");
+  const auto second = other.solve(drops({0.5, 0.6}), "fn_peak_N", "round 2");
+  EXPECT_EQ(ours.solve(drops({1.0}), "fn_peak_N", "round 1").rows, first.rows);
+  EXPECT_EQ(ours.solve(drops({0.5, 0.6}), "fn_peak_N", "round 2").rows, second.rows);
+  ours.solve(drops({0.75}), "fn_peak_N", "round 3");
+  EXPECT_EQ(other.solve(drops({0.75}), "fn_peak_N", "round 3").rows.size(), 1U);
+  EXPECT_EQ(solved(), 4.0);
+}
+
+TEST_F(GrowingStudyTest, RefusesAStudyThatAnotherExplorationMadeLonger) {
+  auto ours = open();
+  auto other = open();
+  other.solve(drops({0.9}), "fn_peak_N", "round 1");
+  other.solve(drops({0.5}), "fn_peak_N", "round 2");
+  EXPECT_THROW(ours.solve(drops({1.0}), "fn_peak_N", "round 1"), std::runtime_error);
+  EXPECT_EQ(solved(), 2.0);
 }
 
 TEST_F(GrowingStudyTest, RefusesAnotherBlockOrModelUnderTheSameName) {

@@ -40,6 +40,24 @@ std::string solved_mode(const solver::Finger& finger, double mu, double H_m) {
   return outcome.result ? outcome.result->major_mode : "failed";
 }
 
+TEST(MapCommand, SaysThatThereIsNoBorderOrNoValueAndWhy) {
+  const test::TemporaryFolder folder;
+  const std::vector<std::string> words{"map",     "--e", "1",         "--preset", "paper",
+                                       "--cells", "2",   "--bracket", "0.1",      "--quiet"};
+  const auto map = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), words.begin(), words.end());
+    return test::run_oblique(folder, more);
+  };
+  const auto slips = map(
+      {"--x", "mu=0.05:0.1", "--y", "H=0.9:1", "--of", "stick_total_s=0", "--over", "upper(mode)"});
+  EXPECT_EQ(slips.exit_code, 0) << slips.err;
+  EXPECT_THAT(slips.out, HasSubstr("No border was found: all points are in the region "));
+  EXPECT_THAT(slips.out, HasSubstr("No point of the grid has a number of upper(mode)."));
+  const auto failed = map({"--x", "mu=0.4:0.5", "--y", "H=1e-9:2e-9"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_THAT(failed.err, HasSubstr("no point of the grid has a value of major_mode. Point 0"));
+}
+
 TEST(MapCommand, BothSidesOfEveryVertexSolvedAnewHaveTheNamedModes) {
   const auto ran = test::run_oblique(map_words({"--format", "json"}));
   ASSERT_EQ(ran.exit_code, 0) << ran.err;

@@ -60,7 +60,8 @@ TEST(Measurements, NameWhatIsWrongInAFile) {
   EXPECT_THAT(objection_to_file("H,fn_peak_N,fn_peak_N_sd\n1,2,-3\n"),
               HasSubstr("a standard deviation that is not positive"));
   EXPECT_THAT(objection_to_file("H,stick_total_s\n1,0\n", 0.01),
-              HasSubstr("fill in the column stick_total_s_sd"));
+              HasSubstr("stick_total_s is 0, so --sd gives no standard deviation: fill in the "
+                        "column stick_total_s_sd"));
   EXPECT_THAT(objection_to_file("H,fn_peak_N_sd\n1,2\n"), HasSubstr("a column `fn_peak_N_sd`"));
   EXPECT_THAT(objection_to_file("H,mu\n1,2\n"), HasSubstr("no measured output"));
   EXPECT_THAT(objection_to_file("H,fn_peak_N\n-1,2\n", 0.01),

@@ -112,6 +112,74 @@ TEST(Sensitivity, MorrisScreensInputsAndDrawsThem) {
   EXPECT_THAT(script, HasSubstr("with xerrorbars"));
 }
 
+TEST(Sensitivity, MorrisMeasuresALinearOutputAlikeOnARangeAndOnLevels) {
+  const test::TemporaryFolder folder;
+  for (const std::string H :
+       {"0.8:1", "0.8,1", "1,0.8", "0.8,0.83,1", "0.8:1:4", "0.8:1:5", "0.8:1:11:log"}) {
+    const auto json = json_of(test::run_oblique(
+        folder, {"sensitivity", "--method", "morris", "--preset", "paper", "--H", H, "--mu",
+                 "0.1:0.4", "--e", "1", "--of", "H", "--rows", "16", "--format", "json"}));
+    EXPECT_NEAR(json["rows"][0]["mu_star"].get<double>(), 0.2, 1e-12) << H;
+    EXPECT_NEAR(json["rows"][0]["sigma"].get<double>(), 0.0, 1e-12) << H;
+    EXPECT_EQ(json["rows"][1]["mu_star"], 0.0) << H;
+  }
+}
+
+TEST(Sensitivity, NotesOutputsThatShowNoEffectAndWhy) {
+  const test::TemporaryFolder folder;
+  for (const std::string method : {"sobol", "morris"}) {
+    const auto noted = [&](const std::string& of) {
+      std::vector<std::string> words{"sensitivity", "--preset", "paper",  "--H",      "1",
+                                     "--mu",        "0.05:0.1", "--e",    "0.5:1",    "--rows",
+                                     "4",           "--of",     of,       "--method", method,
+                                     "--format",    "json",     "--quiet"};
+      if (method == "sobol") {
+        words.insert(words.end(), {"--interval", "9"});
+      }
+      const auto outcome = test::run_oblique(folder, words);
+      EXPECT_EQ(outcome.exit_code, 0) << of << outcome.err;
+      return nlohmann::json::parse(outcome.out)["notes"].dump();
+    };
+    EXPECT_THAT(noted("stick_total_s"), HasSubstr("stick_total_s is the same in all 4 rows."));
+    EXPECT_THAT(noted("major_mode = 'nonsense'"), HasSubstr("is the same in all 4 rows."));
+    EXPECT_THAT(noted("2.5 + 1e-16 * mu"), HasSubstr("is the same in all 4 rows."));
+    EXPECT_THAT(noted("duration_s,upper(mode)"),
+                HasSubstr("None of the 4 rows has a number of upper(mode)."));
+  }
+}
+
+TEST(Sensitivity, TablesAndCsvHaveNotesToo) {
+  const test::TemporaryFolder folder;
+  const std::vector<std::string> flags{"--rows", "4", "--interval", "9", "--of", "mu > 9"};
+  EXPECT_THAT(sensitivity(folder, flags).out, HasSubstr("\n\nmu > 9 is the same in all 4 rows.\n"));
+  auto csv = flags;
+  csv.insert(csv.end(), {"--format", "csv"});
+  EXPECT_THAT(sensitivity(folder, csv).err, HasSubstr("Note: mu > 9 is the same in all 4 rows."));
+}
+
+TEST(Sensitivity, FailsWithTheFirstErrorIfNoRowIsLeft) {
+  const test::TemporaryFolder folder;
+  const auto failed =
+      test::run_oblique(folder, {"sensitivity", "--preset", "paper", "--H", "1e-9:2e-9", "--mu",
+                                 "0.4:0.5", "--e", "1", "--rows", "4", "--quiet"});
+  EXPECT_EQ(failed.exit_code, 1);
+  EXPECT_EQ(failed.out, "");
+  EXPECT_THAT(failed.err, HasSubstr("None of the 4 rows has a number of duration_s."));
+  EXPECT_THAT(failed.err, HasSubstr(" Point 0 failed: "));
+  const auto texts = sensitivity(folder, {"--rows", "4", "--of", "upper(mode)"});
+  EXPECT_EQ(texts.exit_code, 1);
+  EXPECT_THAT(texts.err, HasSubstr("A text needs a condition, such as mode = 'sC sR'."));
+}
+
+TEST(Sensitivity, NotesThatMostRowsAreDropped) {
+  const test::TemporaryFolder folder;
+  const auto json =
+      json_of(sensitivity(folder, {"--rows", "32", "--interval", "9", "--of",
+                                   "CASE WHEN mu < 1 THEN e END", "--format", "json"}));
+  ASSERT_GT(json["rows"][0]["dropped"], json["rows"][0]["rows"]);
+  EXPECT_THAT(json["notes"].dump(), HasSubstr("END has a value in only "));
+}
+
 TEST(Sensitivity, WrongFlagsAreRefusedBeforeAnythingIsSolved) {
   const test::TemporaryFolder folder;
   const auto objection = [&folder](const std::vector<std::string>& flags) {
@@ -122,6 +190,7 @@ TEST(Sensitivity, WrongFlagsAreRefusedBeforeAnythingIsSolved) {
   EXPECT_THAT(objection({"--of", "fn_peek_N"}), HasSubstr("did you mean `fn_peak_N`?"));
   EXPECT_THAT(objection({"--method", "sobel"}), HasSubstr("sobol"));
   EXPECT_THAT(objection({"--interval", "0"}), HasSubstr("--interval"));
+  EXPECT_THAT(objection({"--method", "morris", "--interval", "0.1"}), HasSubstr("--interval"));
   EXPECT_THAT(objection({"--rows", "1000000000000"}), HasSubstr("--rows"));
   EXPECT_THAT(objection({"--out", "bars.xyz"}), HasSubstr("--out"));
   EXPECT_THAT(objection({"--where", "mu > 1"}), HasSubstr("--where"));

@@ -102,6 +102,17 @@ std::vector<double> morris_outputs(const Function& f, std::size_t inputs, std::u
   return outputs_of(f, morris_trajectory, inputs, seed, trajectories);
 }
 
+/// Returns the coordinates of the points of the first trajectories.
+std::vector<double> morris_points(std::size_t inputs, std::uint64_t seed,
+                                  std::uint64_t trajectories) {
+  std::vector<double> points;
+  for (std::uint64_t number = 0; number < trajectories; ++number) {
+    const auto some = morris_trajectory(inputs, seed, number);
+    points.insert(points.end(), some.begin(), some.end());
+  }
+  return points;
+}
+
 bool contains(const Estimate& estimate, double truth) {
   return estimate.from <= truth && truth <= estimate.to;
 }
@@ -197,6 +208,13 @@ TEST(SobolIndicesTest, OutputsWithoutVarianceOrRowsHaveNoIndices) {
   const auto constant = sobol_indices(same, 3, 1);
   EXPECT_TRUE(std::isnan(constant.measures[0].of_inputs[0].value));
   EXPECT_TRUE(std::isnan(constant.measures[1].of_inputs[2].to));
+  std::vector<double> rounded = same;
+  for (std::size_t i = 0; i < rounded.size(); i += 3) {
+    rounded[i] = std::nextafter(4909.4, 0.0);
+  }
+  const auto by_rounding = sobol_indices(rounded, 3, 1);
+  EXPECT_TRUE(std::isnan(by_rounding.measures[0].of_inputs[0].value));
+  EXPECT_TRUE(std::isnan(by_rounding.measures[1].of_inputs[2].to));
   const auto none = sobol_indices(std::vector<double>(5, kNaN), 3, 1);
   EXPECT_EQ(none.rows, 0U);
   EXPECT_EQ(none.dropped, 1U);
@@ -233,13 +251,41 @@ TEST(MorrisTest, TheEffectsOfALinearFunctionAreItsCoefficients) {
     }
     return sum;
   };
-  const auto effects = morris_effects(morris_outputs(linear, 4, 7, 16), 4, 7);
+  const auto effects =
+      morris_effects(morris_outputs(linear, 4, 7, 16), morris_points(4, 7, 16), 4, 7);
   EXPECT_EQ(effects.rows, 16U);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(effects.measures[2].of_inputs[i].value, slopes[i], 1e-12);
     EXPECT_NEAR(effects.measures[0].of_inputs[i].value, std::abs(slopes[i]), 1e-12);
     EXPECT_NEAR(effects.measures[0].of_inputs[i].half_width(), 0.0, 1e-12);
-    EXPECT_NEAR(effects.measures[1].of_inputs[i].value, 0.0, 1e-6);  // sqrt of a rounding error
+    EXPECT_EQ(effects.measures[1].of_inputs[i].value, 0.0);
+  }
+}
+
+TEST(MorrisTest, TheEffectsOfALinearFunctionAreItsCoefficientsAlsoOnUnevenLevels) {
+  constexpr std::uint64_t kRows = 32;
+  for (const std::vector<double>& levels :
+       {std::vector{0.0, 1.0}, {0.0, 0.1, 1.0}, {1.0, 0.0, 0.7}, {0.0, 0.25, 0.5, 0.75, 1.0}}) {
+    auto points = morris_points(2, 3, kRows);
+    for (double& u : points) {
+      u = levels[static_cast<std::size_t>(u * static_cast<double>(levels.size()))];
+    }
+    const auto outputs = outputs_at(
+        [](std::span<const double> u) { return 5.0 + 3.0 * u[0] - 0.2 * u[1]; }, points, 2);
+    const auto effects = morris_effects(outputs, points, 2, 3);
+    EXPECT_NEAR(effects.measures[0].of_inputs[0].value, 3.0, 1e-12) << levels.size();
+    EXPECT_NEAR(effects.measures[2].of_inputs[1].value, -0.2, 1e-12) << levels.size();
+    EXPECT_NEAR(effects.measures[1].of_inputs[0].value, 0.0, 1e-12) << levels.size();
+  }
+}
+
+TEST(MorrisTest, AnOutputThatVariesByRoundingErrorsHasNoEffects) {
+  const auto nearly_constant = [](std::span<const double> u) { return 2.5 + 4e-16 * u[0]; };
+  const auto effects =
+      morris_effects(morris_outputs(nearly_constant, 2, 1, 16), morris_points(2, 1, 16), 2, 1);
+  for (const Measure& measure : effects.measures) {
+    EXPECT_EQ(measure.of_inputs[0].value, 0.0) << measure.name;
+    EXPECT_EQ(measure.of_inputs[0].to, 0.0) << measure.name;
   }
 }
 
@@ -247,7 +293,8 @@ TEST(MorrisTest, TheEffectsOfALinearFunctionAreItsCoefficients) {
 // variance is (8^2 - 1)/12/8^2, and the mean of its magnitude is 1/4.
 TEST(MorrisTest, AnInteractionHasADeviationWhereItsMeanIsZero) {
   const auto product = [](std::span<const double> u) { return u[0] * (u[1] - 0.5); };
-  const auto effects = morris_effects(morris_outputs(product, 2, 1, 4000), 2, 1);
+  const auto effects =
+      morris_effects(morris_outputs(product, 2, 1, 4000), morris_points(2, 1, 4000), 2, 1);
   EXPECT_NEAR(effects.measures[2].of_inputs[0].value, 0.0, 0.02);
   EXPECT_NEAR(effects.measures[0].of_inputs[0].value, 0.25, 0.01);
   EXPECT_NEAR(effects.measures[1].of_inputs[0].value, std::sqrt(63.0 / 768.0), 0.01);
@@ -280,12 +327,13 @@ TEST(MorrisTest, ATrajectoryWithAFailedPointIsDroppedAndOneAloneHasNoEffects) {
   const auto f = [](std::span<const double> u) { return u[0] + u[1]; };
   auto outputs = morris_outputs(f, 2, 1, 3);
   outputs[4] = kNaN;
-  const auto two = morris_effects(outputs, 2, 1);
+  const auto two = morris_effects(outputs, morris_points(2, 1, 3), 2, 1);
   EXPECT_EQ(two.rows, 2U);
   EXPECT_EQ(two.dropped, 1U);
   EXPECT_NEAR(two.measures[2].of_inputs[1].value, 1.0, 1e-12);
   outputs[0] = kNaN;
-  EXPECT_TRUE(std::isnan(morris_effects(outputs, 2, 1).measures[0].of_inputs[0].value));
+  EXPECT_TRUE(std::isnan(
+      morris_effects(outputs, morris_points(2, 1, 3), 2, 1).measures[0].of_inputs[0].value));
 }
 
 }  // namespace

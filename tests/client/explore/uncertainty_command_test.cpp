@@ -56,6 +56,20 @@ TEST_F(Uncertainty, StatisticsOfAnInputAreThoseOfItsDistribution) {
   EXPECT_NEAR(of["correlation mu"]["value"], 0.0, 0.3);
 }
 
+TEST_F(Uncertainty, NotesOutputsWithoutValuesOrWithOne) {
+  const auto json = nlohmann::json::parse(
+      uncertainty({"spread", "--of", "fn_peak_N,H,2.5 + 1e-16 * mu,CASE WHEN mu < 0.2 THEN e END",
+                   "--format", "json"})
+          .out);
+  const auto notes = json["notes"].dump();
+  EXPECT_THAT(notes, HasSubstr("H is the same in all 200 rows."));
+  EXPECT_THAT(notes, HasSubstr("END has a value in only "));
+  EXPECT_THAT(notes, HasSubstr("2.5 + 1e-16 * mu is the same in all 200 rows."));
+  const auto none = uncertainty({"spread", "--of", "mu + NULL"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("None of the 200 rows has a number of"));
+}
+
 TEST_F(Uncertainty, ModesHaveProbabilitiesThatAddUpToOne) {
   const auto outcome = uncertainty({"spread", "--of", "major_mode", "--format", "json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -47,19 +48,42 @@ TEST(MeanTest, MeanAndDeviationAreThoseOfTheValues) {
   const std::vector<double> values{2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0};
   EXPECT_DOUBLE_EQ(mean_of(values).value, 5.0);
   EXPECT_DOUBLE_EQ(deviation_of(values), std::sqrt(32.0 / 7.0));
-  EXPECT_NEAR(mean_of(values).half_width(), 1.96 * std::sqrt(32.0 / 7.0 / 8.0), 1e-4);
+  EXPECT_NEAR(mean_of(values).half_width(), 2.364624 * std::sqrt(32.0 / 7.0 / 8.0), 1e-4);
   EXPECT_TRUE(std::isnan(mean_of({}).value));
   EXPECT_EQ(mean_of(std::vector<double>{3.0}).value, 3.0);
   EXPECT_TRUE(std::isnan(deviation_of(std::vector<double>{3.0})));
+  EXPECT_TRUE(std::isnan(mean_of(std::vector<double>{3.0}).from));
+}
+
+// Published tables of Student's distribution.
+TEST(MeanTest, TheQuantilesOfStudentsDistributionAreThoseOfTables) {
+  for (const auto& [degrees, t] :
+       std::vector<std::pair<std::uint64_t, double>>{{1, 12.7062},
+                                                     {2, 4.30265},
+                                                     {3, 3.18245},
+                                                     {4, 2.77645},
+                                                     {5, 2.57058},
+                                                     {6, 2.44691},
+                                                     {9, 2.26216},
+                                                     {10, 2.22814},
+                                                     {29, 2.04523},
+                                                     {30, 2.04227},
+                                                     {120, 1.97993},
+                                                     {1'000, 1.96234},
+                                                     {1'000'000, 1.95997}}) {
+    EXPECT_NEAR(t_quantile(degrees), t, 1.1e-4 * t) << degrees;
+  }
 }
 
 TEST(MeanTest, IntervalsCoverTheMeanOfNormalDrawsAsOftenAsTheySay) {
-  int covered = 0;
-  for (int i = 0; i < kIntervals; ++i) {
-    const auto draws = normal_draws(100, static_cast<std::uint64_t>(i), 0.4, 0.05);
-    covered += covers(mean_of(draws), 0.4) ? 1 : 0;
+  for (const std::size_t n : {2U, 3U, 8U, 100U}) {
+    int covered = 0;
+    for (int i = 0; i < kIntervals; ++i) {
+      const auto draws = normal_draws(n, static_cast<std::uint64_t>(i), 0.4, 0.05);
+      covered += covers(mean_of(draws), 0.4) ? 1 : 0;
+    }
+    EXPECT_NEAR(covered, kExpected, kSlack) << n;
   }
-  EXPECT_NEAR(covered, kExpected, kSlack);
 }
 
 TEST(QuantileTest, ItIsInterpolatedBetweenTheValuesAround) {

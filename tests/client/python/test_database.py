@@ -3,6 +3,7 @@
 import csv
 import io
 import pathlib
+import pickle
 import sqlite3
 
 import numpy as np
@@ -14,6 +15,13 @@ from conftest import run_oblique
 
 def rows_of_program(*arguments):
     return list(csv.DictReader(io.StringIO(run_oblique(*arguments, "--format", "csv"))))
+
+
+def test_a_database_and_its_answer_can_be_pickled(database):
+    opened = pickle.loads(pickle.dumps(oblique.Database(database)))
+    answer = pickle.loads(pickle.dumps(opened.query("sweep", select="mu, mode")))
+    assert opened.file == database and opened.studies()[0].name == "sweep"
+    assert answer.mu.tolist() == oblique.Database(database).query("sweep", select="mu").mu.tolist()
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,16 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "client/io/console.h"
+#include "client/service/watching.h"
 #include "proto/frames.h"
+#include "proto/program/process.h"
 #include "tests/client/service/scripted_server.h"
 #include "tests/support/reserved_port.h"
 #include "worker/solver/model/parameters.h"
@@ -193,6 +197,22 @@ TEST(Connection, ReportsSilenceAndTheNextAnswer) {
   ASSERT_EQ(sentences.size(), 2U);
   EXPECT_NE(sentences[0].find("no answer from " + port.url()), std::string::npos) << sentences[0];
   EXPECT_NE(sentences[1].find("answers again"), std::string::npos) << sentences[1];
+}
+
+TEST(WatchStudy, SaysThatTheServerIsAwayAlsoIfOnlyErrorsArePrinted) {
+  std::ostringstream out;
+  std::ostringstream err;
+  Console console(out, err);
+  console.set_verbosity(Verbosity::kQuiet);
+  protocol::StopSignals stop;
+  const auto ask = [](const Tell& tell) {
+    tell("no answer from tcp://x: waiting for it");
+    protocol::StudyStatus status;
+    status.set_state("done");
+    return status;
+  };
+  watch_study(console, ask, stop);
+  EXPECT_EQ(err.str(), "no answer from tcp://x: waiting for it\n");
 }
 
 /// The message StillWorking, which a server sends while a query waits or runs.
