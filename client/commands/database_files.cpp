@@ -41,7 +41,10 @@ constexpr const char* kBackupExamples = R"(Examples:
   oblique backup saved.db --db damaged.db --salvage
 
 The copy is the state of the database at one instant; a server may use the database meanwhile. The
-copy is checked, and appears under its name when it is complete.)";
+copy is checked as by `oblique check`, and appears under its name when it is complete. If results or
+studies of the database are damaged, so is the copy: the faults are printed, with exit code 1.
+--salvage leaves out damaged results, which are solved again, and names everything else that is not
+as it was stored, with exit code 1.)";
 
 constexpr const char* kCheckExamples = R"(Examples:
   oblique check
@@ -146,7 +149,10 @@ int salvage(const BackupFlags& flags, Console& console) {
       "that continues with the copy solves the missing points.\n",
       flags.copy, format_count(saved.studies), format_count(saved.results), flags.database.file,
       format_count(saved.unreadable_places));
-  return kDone;
+  for (const std::string& loss : saved.losses) {
+    console.errors() << protocol::visible(loss) << ".\n";
+  }
+  return saved.losses.empty() ? kDone : kFailed;
 }
 
 void check_copy(const std::string& copy) {
@@ -166,11 +172,20 @@ int backup(const BackupFlags& flags, Console& console) {
   if (flags.salvage) {
     return salvage(flags, console);
   }
-  server::back_up(flags.database.file, flags.copy);
+  const auto faults = server::back_up(flags.database.file, flags.copy);
   std::error_code ignored;
   console.notes() << fmt::format("{} is a copy of {}, {}.\n", flags.copy, flags.database.file,
                                  format_bytes(std::filesystem::file_size(flags.copy, ignored)));
-  return kDone;
+  for (const std::string& fault : faults) {
+    console.errors() << protocol::visible(fault) << '\n';
+  }
+  if (!faults.empty()) {
+    console.errors() << fmt::format(
+        "{0} is damaged, and so is its copy. To save what can be read:\n  oblique backup saved.db "
+        "--db {0} --salvage\n",
+        flags.database.file);
+  }
+  return faults.empty() ? kDone : kFailed;
 }
 
 struct DatabaseCheckFlags {
