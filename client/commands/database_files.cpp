@@ -142,6 +142,23 @@ struct BackupFlags {
   DatabaseSettings database;
 };
 
+/// Prints damage, each a sentence. Returns the exit code.
+template <class Sentences>
+int report(const Sentences& faults, std::ostream& out) {
+  for (const std::string& fault : faults) {
+    out << protocol::visible(fault) << '\n';
+  }
+  return faults.empty() ? kDone : kFailed;
+}
+
+int report_damage(Console& console, const std::string& database, std::string_view what) {
+  console.errors() << fmt::format(
+      "{0} is damaged{1}. To save what can be read:\n  oblique backup saved.db --db {0} "
+      "--salvage\n",
+      database, what);
+  return kFailed;
+}
+
 int salvage(const BackupFlags& flags, Console& console) {
   const auto saved = server::salvage(flags.database.file, flags.copy);
   console.notes() << fmt::format(
@@ -149,10 +166,7 @@ int salvage(const BackupFlags& flags, Console& console) {
       "that continues with the copy solves the missing points.\n",
       flags.copy, format_count(saved.studies), format_count(saved.results), flags.database.file,
       format_count(saved.unreadable_places));
-  for (const std::string& loss : saved.losses) {
-    console.errors() << protocol::visible(loss) << ".\n";
-  }
-  return saved.losses.empty() ? kDone : kFailed;
+  return report(saved.losses, console.errors());
 }
 
 void check_copy(const std::string& copy) {
@@ -176,16 +190,9 @@ int backup(const BackupFlags& flags, Console& console) {
   std::error_code ignored;
   console.notes() << fmt::format("{} is a copy of {}, {}.\n", flags.copy, flags.database.file,
                                  format_bytes(std::filesystem::file_size(flags.copy, ignored)));
-  for (const std::string& fault : faults) {
-    console.errors() << protocol::visible(fault) << '\n';
-  }
-  if (!faults.empty()) {
-    console.errors() << fmt::format(
-        "{0} is damaged, and so is its copy. To save what can be read:\n  oblique backup saved.db "
-        "--db {0} --salvage\n",
-        flags.database.file);
-  }
-  return faults.empty() ? kDone : kFailed;
+  return report(faults, console.errors()) == kDone
+             ? kDone
+             : report_damage(console, flags.database.file, ", and so is its copy");
 }
 
 struct DatabaseCheckFlags {
@@ -195,19 +202,13 @@ struct DatabaseCheckFlags {
 int check(const DatabaseCheckFlags& flags, Console& console) {
   const std::string database = flags.database.string();
   const auto found = server::diagnose(database);
-  for (const auto* sentences : {&found.faults, &found.remarks}) {
-    for (const auto& sentence : *sentences) {
-      console.out() << protocol::visible(sentence) << '\n';
-    }
+  const int exit_code = report(found.faults, console.out());
+  report(found.remarks, console.out());
+  if (exit_code != kDone) {
+    return report_damage(console, database, "");
   }
-  if (found.faults.empty()) {
-    console.notes() << fmt::format("{} is sound.\n", database);
-    return kDone;
-  }
-  console.errors() << fmt::format(
-      "{0} is damaged. To save what can be read:\n  oblique backup saved.db --db {0} --salvage\n",
-      database);
-  return kFailed;
+  console.notes() << fmt::format("{} is sound.\n", database);
+  return kDone;
 }
 
 }  // namespace

@@ -19,6 +19,9 @@ constexpr const char* kAfterFailedSync =
 [[noreturn]] void fail(sqlite3* database, int code, const std::string& reason) {
   check_gone(database, code);
   switch (static_cast<unsigned>(code) & 0xffU) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      throw StorageBusy("another program has locked the database: " + reason);
     case SQLITE_ERROR:
     case SQLITE_CONSTRAINT:
     case SQLITE_MISMATCH:
@@ -255,6 +258,8 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
     application_id = pragma(database, "application_id");
     version = pragma(database, "user_version");
     has_tables = Statement(database, "SELECT 1 FROM sqlite_schema").step();
+  } catch (const StorageBusy&) {
+    throw;
   } catch (const StorageError&) {
     const int code = sqlite3_errcode(database);
     throw StorageError(code == SQLITE_NOTADB

@@ -26,6 +26,12 @@ class StorageGone : public StorageError {
   using StorageError::StorageError;
 };
 
+/// Another program has locked the database for longer than the connection waits.
+class StorageBusy : public StorageError {
+ public:
+  using StorageError::StorageError;
+};
+
 /// A change contradicts the file, so it fails at every attempt, unlike with a full disk.
 class ChangeRefused : public StorageError {
  public:

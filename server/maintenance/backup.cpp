@@ -8,6 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frames.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/check.h"
@@ -100,7 +101,7 @@ std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salva
         fmt::format("the table {} has lost the columns {}", rows.table, fmt::join(lost, ", ")));
   }
   if (columns.empty()) {
-    return 0;
+    return 0;  // the table itself is lost
   }
   if (!lost.empty() && std::erase(columns, "checksum") > 0) {
     lost.emplace_back("checksum");
@@ -258,7 +259,10 @@ DatabaseHandle open_damaged(const std::string& from, const DraftFile& draft, sql
 
 }  // namespace
 
-void copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
+std::vector<std::string> copy_into(const DraftFile& draft, const std::string& from,
+                                   const std::string& to) {
+  // Maximum size of a stored value. Values arrive in messages, whose size is limited.
+  constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
   const DatabaseHandle source = open_with_schema(from);
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
@@ -267,13 +271,14 @@ void copy_into(const DraftFile& draft, const std::string& from, const std::strin
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged and was not copied: " + faults.front());
   }
+  sqlite3_limit(copy.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
+  return diagnose_contents(copy.get()).faults;
 }
 
 std::vector<std::string> back_up(const std::string& from, const std::string& to) {
   check_is_new(to);
   const DraftFile draft(to + ".part");
-  copy_into(draft, from, to);
-  auto faults = diagnose_contents(open_database(draft.path(), SQLITE_OPEN_READONLY).get()).faults;
+  auto faults = copy_into(draft, from, to);
   draft.keep_as(to);
   return faults;
 }

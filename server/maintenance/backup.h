@@ -17,7 +17,8 @@ namespace oblique::server {
 std::vector<std::string> back_up(const std::string& from, const std::string& to);
 
 /// Copies like `back_up`, but into a draft. `to` is the name of the copy in error messages.
-void copy_into(const DraftFile& draft, const std::string& from, const std::string& to);
+std::vector<std::string> copy_into(const DraftFile& draft, const std::string& from,
+                                   const std::string& to);
 
 /// Numbers of readable rows in a damaged database.
 struct Salvaged {

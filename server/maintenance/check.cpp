@@ -182,16 +182,6 @@ class StudyCheck {
           "studies SET counted = 0 WHERE study_id = {} makes the next server count them",
           completed.size(), rows.size(), studies_.integer(0)));
     }
-    without_row.for_each([&](const Interval& range) {
-      for (const std::uint64_t point : {range.begin, range.end - 1}) {
-        if (has_filter && point < table.size() && table->passes_filter(point)) {
-          add_fault(fmt::format(
-              "point {} is completed without a result, but the condition keeps it. UPDATE studies "
-              "SET counted = 0 WHERE study_id = {} makes the next server count the points",
-              point, studies_.integer(0)));
-        }
-      }
-    });
     const std::string state = studies_.text(4);
     if (completed.size() != table.size()) {
       (state == "done" && is_counted ? study_faults_ : found_.remarks)

@@ -96,7 +96,9 @@ CREATE TABLE results (
   solved_at        TEXT NOT NULL, -- UTC, ISO 8601
   reused_from      TEXT,          -- STUDY/POINT that this result was copied from, by its name then; NULL: not a copy
   checksum         INTEGER,       -- CRC-32 of the other columns; NULL after a change by hand
-  PRIMARY KEY (study_id, point)
+  PRIMARY KEY (study_id, point),
+  CHECK (length(error) <= 65536 AND length(mode) <= 65536 AND length(major_mode) <= 65536
+         AND length(margin_event) <= 65536)
 ) STRICT, WITHOUT ROWID;
 
 -- Completed points as ranges: points with a row, and points that `where` leaves out.

@@ -41,6 +41,19 @@ TEST_F(DatabaseQuery, AStatementHasATimeLimit) {
   EXPECT_THAT(outcome.err, HasSubstr("took more than 0.2 s"));
 }
 
+TEST_F(DatabaseQuery, TheTimeLimitAlsoEndsASingleFunctionThatTakesHours) {
+  const std::string hours =
+      "instr(zeroblob(30000000), CAST(zeroblob(15000000) || x'01' AS BLOB)) > 5";
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"sql", "SELECT " + hours}, {"query", "a", "--where", hours}}) {
+    auto arguments = words;
+    arguments.insert(arguments.end(), {"--timeout", "0.2"});
+    const auto outcome = run_command(arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << words[0];
+    EXPECT_THAT(outcome.err, HasSubstr("took more than 0.2 s")) << words[0];
+  }
+}
+
 TEST_F(DatabaseQuery, AStatementHasAMemoryLimit) {
   EXPECT_THAT(run_command({"sql", "SELECT hex(zeroblob(450000000))"}).err,
               HasSubstr("exceeds the allowed 64 MiB"));
@@ -63,7 +76,7 @@ TEST_F(DatabaseQuery, ABackupOfADamagedFileNamesTheFaultsAndExitsWith1) {
                                          HasSubstr("and so is its copy")));
   const auto saved = run_command({"backup", "saved.db", "--salvage"});
   EXPECT_EQ(saved.exit_code, 1);
-  EXPECT_THAT(saved.err, HasSubstr("called \"damaged study 1\" now."));
+  EXPECT_THAT(saved.err, HasSubstr("called \"damaged study 1\" now"));
 }
 
 TEST_F(DatabaseQuery, AFileWhoseViewWasChangedIsRefusedByName) {

@@ -421,6 +421,14 @@ TEST_F(SchemaTest, AStartRestoresDefinitionsThatWereChangedAndRefusesChangedTabl
   EXPECT_THAT(refusal(), AllOf(HasSubstr("table results"), HasSubstr("--salvage")));
 }
 
+TEST_F(SchemaTest, TextsOfResultsAreBounded) {
+  for (const char* column : {"mode", "major_mode", "margin_event", "error"}) {
+    EXPECT_THROW(execute_sql(fmt::format("UPDATE results SET {} = hex(zeroblob(500000))", column)),
+                 StorageError)
+        << column;
+  }
+}
+
 TEST_F(SchemaTest, ElementsOfOtherProgramsAreNoFaultButNamed) {
   execute_sql(
       "CREATE TABLE notes (text TEXT UNIQUE); CREATE INDEX by_force ON results (fn_peak_N);"
