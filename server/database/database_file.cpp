@@ -178,7 +178,7 @@ ServerFile::ServerFile(const std::string& path) : path_(fs::absolute(path).strin
     file_ = protocol::Descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnerOnly));
     is_new_ = file_.is_open();
   }
-  if (::fstat(file_.number(), &opened_) != 0) {
+  if (!file_.is_open() || ::fstat(file_.number(), &opened_) != 0) {
     throw StorageError("cannot open the database " + path +
                        " for writing: " + std::strerror(errno));
   }

@@ -248,9 +248,8 @@ TEST_F(SalvageTest, ATableThatLostAColumnIsSavedWithoutItUnlessItsRowsNeedTheCol
       "ALTER TABLE results DROP COLUMN margin");
   const auto without_columns = salvage(path_, copy_);
   EXPECT_EQ(without_columns.results, 5U);
-  EXPECT_THAT(without_columns.losses,
-              ElementsAre("the table results has lost the columns margin",
-                          "the table studies has lost the columns reuses"));
+  EXPECT_THAT(without_columns.losses, ElementsAre("the table results has lost the columns margin",
+                                                  "the table studies has lost the columns reuses"));
   EXPECT_THAT(faults(copy_), IsEmpty());
   std::filesystem::remove(copy_);
   execute_sql("ALTER TABLE results DROP COLUMN slide_m");
