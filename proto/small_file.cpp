@@ -2,8 +2,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
+#include <fcntl.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
 
@@ -41,6 +44,16 @@ std::string read_small_file(const std::string& path, std::string_view what,
   }
   text.resize(static_cast<std::size_t>(file.gcount()));
   return text;
+}
+
+Descriptor opened_folder_of(const std::string& path) {
+  const std::string folder = std::filesystem::absolute(path).parent_path();
+  Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!opened.is_open()) {
+    throw std::runtime_error(
+        fmt::format("cannot open the folder {}: {}", folder, std::strerror(errno)));
+  }
+  return opened;
 }
 
 }  // namespace oblique::protocol

@@ -41,7 +41,10 @@ constexpr const char* kBackupExamples = R"(Examples:
   oblique backup saved.db --db damaged.db --salvage
 
 The copy is the state of the database at one instant; a server may use the database meanwhile. The
-copy is checked, and appears under its name when it is complete.)";
+copy is checked as by `oblique check`, and appears under its name when it is complete. If results or
+studies of the database are damaged, so is the copy: the faults are printed, with exit code 1.
+--salvage leaves out damaged results, which are solved again, and names everything else that is not
+as it was stored, with exit code 1.)";
 
 constexpr const char* kCheckExamples = R"(Examples:
   oblique check
@@ -139,6 +142,23 @@ struct BackupFlags {
   DatabaseSettings database;
 };
 
+/// Prints damage, each a sentence. Returns the exit code.
+template <class Sentences>
+int report(const Sentences& faults, std::ostream& out) {
+  for (const std::string& fault : faults) {
+    out << protocol::visible(fault) << '\n';
+  }
+  return faults.empty() ? kDone : kFailed;
+}
+
+int report_damage(Console& console, const std::string& database, std::string_view what) {
+  console.errors() << fmt::format(
+      "{0} is damaged{1}. To save what can be read:\n  oblique backup saved.db --db {0} "
+      "--salvage\n",
+      database, what);
+  return kFailed;
+}
+
 int salvage(const BackupFlags& flags, Console& console) {
   const auto saved = server::salvage(flags.database.file, flags.copy);
   console.notes() << fmt::format(
@@ -146,7 +166,7 @@ int salvage(const BackupFlags& flags, Console& console) {
       "that continues with the copy solves the missing points.\n",
       flags.copy, format_count(saved.studies), format_count(saved.results), flags.database.file,
       format_count(saved.unreadable_places));
-  return kDone;
+  return report(saved.losses, console.errors());
 }
 
 void check_copy(const std::string& copy) {
@@ -166,11 +186,13 @@ int backup(const BackupFlags& flags, Console& console) {
   if (flags.salvage) {
     return salvage(flags, console);
   }
-  server::back_up(flags.database.file, flags.copy);
+  const auto faults = server::back_up(flags.database.file, flags.copy);
   std::error_code ignored;
   console.notes() << fmt::format("{} is a copy of {}, {}.\n", flags.copy, flags.database.file,
                                  format_bytes(std::filesystem::file_size(flags.copy, ignored)));
-  return kDone;
+  return report(faults, console.errors()) == kDone
+             ? kDone
+             : report_damage(console, flags.database.file, ", and so is its copy");
 }
 
 struct DatabaseCheckFlags {
@@ -180,19 +202,13 @@ struct DatabaseCheckFlags {
 int check(const DatabaseCheckFlags& flags, Console& console) {
   const std::string database = flags.database.string();
   const auto found = server::diagnose(database);
-  for (const auto* sentences : {&found.faults, &found.remarks}) {
-    for (const auto& sentence : *sentences) {
-      console.out() << protocol::visible(sentence) << '\n';
-    }
+  const int exit_code = report(found.faults, console.out());
+  report(found.remarks, console.out());
+  if (exit_code != kDone) {
+    return report_damage(console, database, "");
   }
-  if (found.faults.empty()) {
-    console.notes() << fmt::format("{} is sound.\n", database);
-    return kDone;
-  }
-  console.errors() << fmt::format(
-      "{0} is damaged. To save what can be read:\n  oblique backup saved.db --db {0} --salvage\n",
-      database);
-  return kFailed;
+  console.notes() << fmt::format("{} is sound.\n", database);
+  return kDone;
 }
 
 }  // namespace

@@ -28,6 +28,7 @@
 #include "proto/text.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"
+#include "server/store/schema.h"
 #include "worker/solver/solve.h"
 
 namespace oblique::client {
@@ -228,7 +229,8 @@ void check_database(Diagnosis& diagnosis, const std::string& named_file) {
       diagnosis.ok(kCheck, file + " is empty");
       return;
     }
-    server::Statement studies(database.get(), "SELECT count(*) FROM studies");
+    const auto sound = server::open_with_schema(file);
+    server::Statement studies(sound.get(), "SELECT count(*) FROM studies");
     studies.step();
     diagnosis.ok(
         kCheck,

@@ -75,6 +75,7 @@ int view(const ViewFlags& flags, Console& console) {
                     file));
   }
   refuse_used_database(how.database);
+  how.tell = [&console](const std::string& sentence) { console.note(sentence); };
   how.http = fmt::format("127.0.0.1:{}", flags.port);
   // created before any thread starts; see StopSignals
   protocol::StopSignals stop;

@@ -88,6 +88,7 @@ GrowingStudy::GrowingStudy(Console& console, const ExploreFlags& flags, std::str
       settings.database = flags.source.database;
     }
     settings.only_study = name_;
+    settings.tell = [&console](const std::string& sentence) { console.note(sentence); };
     refuse_used_database(settings.database);
     service_ = std::make_unique<EmbeddedService>(settings, stop);
     where.server_url = service_->client_url();

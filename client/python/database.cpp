@@ -43,7 +43,7 @@ struct Column {
 
 std::vector<Column> answer_to(server::Reader& reader, const protocol::QueryRequest& request) {
   std::vector<Column> columns;
-  server::Answer answer = reader.answer(request, server::kNoLimits);
+  server::Answer answer = reader.answer(request, {UINT64_MAX, 0});
   for (bool ends = false; !ends;) {
     const protocol::QueryReply chunk = answer.next();
     for (int i = static_cast<int>(columns.size()); i < chunk.columns_size(); ++i) {

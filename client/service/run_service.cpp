@@ -64,20 +64,32 @@ void end_all(const std::vector<std::unique_ptr<ChildProcess>>& children) {
   }
 }
 
-/// Returns the first line that the server writes to `ready`, or an empty text if it closes the pipe
+/// Returns the endpoints that the server writes to `ready`, or no object if it closes the pipe
 /// first. Throws ProcessError if no line arrives in time, and Interrupted when `stop` is requested.
-std::string first_line(const Descriptor& ready, const ChildProcess& server,
-                       const std::filesystem::path& database, protocol::StopSignals& stop) {
-  const auto deadline = Clock::now() + kReadyWithin;
+nlohmann::json endpoints(const Descriptor& ready, const ChildProcess& server,
+                         const ServiceSettings& settings, protocol::StopSignals& stop) {
+  auto deadline = Clock::now() + kReadyWithin;
   std::string text;
-  while (text.find('\n') == std::string::npos) {
+  while (true) {
+    for (auto end = text.find('\n'); end != std::string::npos; end = text.find('\n')) {
+      auto line = nlohmann::json::parse(text.substr(0, end), nullptr, false);
+      if (!line.is_object() || !line.contains("waits_for")) {
+        return line;
+      }
+      if (settings.tell) {
+        settings.tell(line.value("waits_for", std::string()));
+      }
+      deadline = Clock::time_point::max();
+      text.erase(0, end + 1);
+    }
     if (stop.requested()) {
       throw Interrupted("stopped before the server was ready");
     }
     if (Clock::now() > deadline) {
-      throw ProcessError(with_last_output(
-          fmt::format("no answer within {} s: {}", kReadyWithin.count(), why_silent(database)),
-          server));
+      throw ProcessError(
+          with_last_output(fmt::format("no answer within {} s: {}", kReadyWithin.count(),
+                                       why_silent(settings.database)),
+                           server));
     }
     constexpr int kSlice_ms = 50;
     pollfd waited{ready.number(), POLLIN, 0};
@@ -91,7 +103,6 @@ std::string first_line(const Descriptor& ready, const ChildProcess& server,
     }
     text.append(bytes.data(), static_cast<std::size_t>(std::max<ssize_t>(got, 0)));
   }
-  return text.substr(0, text.find('\n'));
 }
 
 RunEnd submit_and_wait(Console& console, const Study& study, const RunSettings& settings,
@@ -219,8 +230,7 @@ void EmbeddedService::start_server(const ServiceSettings& settings, protocol::St
   }
   server_ = std::make_unique<ChildProcess>(child);
   ready.write.close();  // now the pipe closes when the server ends
-  const auto urls = nlohmann::json::parse(first_line(ready.read, *server_, settings.database, stop),
-                                          nullptr, false);
+  const auto urls = endpoints(ready.read, *server_, settings, stop);
   if (urls.is_object() && urls.contains("client") && urls.contains("worker")) {
     client_url_ = urls.value("client", std::string());
     worker_url_ = urls.value("worker", std::string());
@@ -317,6 +327,7 @@ std::optional<RunEnd> run_study(Console& console, const Study& study, const RunS
   try {
     ServiceSettings how = settings.service;
     how.only_study = study.name;
+    how.tell = [&console](const std::string& sentence) { console.note(sentence); };
     EmbeddedService service(how, stop);
     auto end = submit_and_wait(console, study, settings, service, stop);
     service.stop();

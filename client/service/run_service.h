@@ -30,6 +30,7 @@ struct ServiceSettings {
   std::uint64_t fall_memory_bytes = 0;  ///< memory for all workers' falls; 0: 1/8 of free memory
   std::string only_study{};             ///< solves only this study; empty: all studies
   bool verbose = false;                 ///< server and workers write to our standard error
+  Tell tell{};                          ///< receives what the server waits for before it is ready
 };
 
 /// Returns, as part of a sentence, why a server that was started on the database may not answer.

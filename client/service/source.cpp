@@ -1,6 +1,9 @@
 #include "client/service/source.h"
 
+#include <chrono>
+#include <future>
 #include <stdexcept>
+#include <thread>
 #include <utility>
 #include <variant>
 
@@ -14,12 +17,23 @@
 namespace oblique::client {
 namespace {
 
-/// Returns the result of `call`. Turns a StatementError into InputError, because the user wrote the
-/// statement.
-template <class Call>
-auto answered(const Call& call) {
+/// Returns the result of `work`, which must own its data and runs on a thread of its own: SQLite
+/// checks a time limit between the steps of a statement, but one function may take hours. A second
+/// after the limit the thread is left behind. Turns a StatementError into InputError, because the
+/// user wrote the statement.
+template <class Work>
+auto within(std::int64_t limit_ms, Work work) {
+  std::packaged_task<decltype(work())()> task(std::move(work));
+  auto result = task.get_future();
+  std::thread thread(std::move(task));
+  if (const std::chrono::milliseconds longest(limit_ms + 1000);
+      limit_ms > 0 && result.wait_for(longest) != std::future_status::ready) {
+    thread.detach();
+    throw server::QueryError(server::took_too_long(limit_ms));
+  }
+  thread.join();
   try {
-    return call();
+    return result.get();
   } catch (const server::StatementError& error) {
     throw solver::InputError(error.what());
   }
@@ -27,18 +41,23 @@ auto answered(const Call& call) {
 
 class DatabaseRows : public RowStream {
  public:
-  explicit DatabaseRows(server::Answer answer) : answer_(std::move(answer)) {}
+  DatabaseRows(std::shared_ptr<server::Reader> reader, std::shared_ptr<server::Answer> answer,
+               std::int64_t limit_ms)
+      : reader_(std::move(reader)), answer_(std::move(answer)), limit_ms_(limit_ms) {}
   protocol::QueryReply next() override {
-    return answered([this] { return answer_.next(); });
+    return within(limit_ms_, [reader = reader_, answer = answer_] { return answer->next(); });
   }
 
  private:
-  server::Answer answer_;
+  std::shared_ptr<server::Reader> reader_;  // declared first, because the answer uses it
+  std::shared_ptr<server::Answer> answer_;
+  std::int64_t limit_ms_;
 };
 
 class Database : public Source {
  public:
-  Database(std::string file, std::int64_t timeout_ms) : file_(std::move(file)), reader_(file_) {
+  Database(std::string file, std::int64_t timeout_ms)
+      : file_(std::move(file)), reader_(std::make_shared<server::Reader>(file_)) {
     constexpr std::int64_t kHeapBytes = std::int64_t{1} << 30U;
     limits_.time_limit_ms = timeout_ms;
     // The memory limit holds for the whole process. Nothing else in the process uses SQLite.
@@ -46,12 +65,14 @@ class Database : public Source {
   }
 
   std::unique_ptr<RowStream> rows(protocol::QueryRequest request) override {
-    return answered(
-        [&] { return std::make_unique<DatabaseRows>(reader_.answer(request, limits_)); });
+    auto answer = within(limits_.time_limit_ms, [reader = reader_, request, limits = limits_] {
+      return std::make_shared<server::Answer>(reader->answer(request, limits));
+    });
+    return std::make_unique<DatabaseRows>(reader_, std::move(answer), limits_.time_limit_ms);
   }
   std::vector<protocol::StudyStatus> status(const std::string& study, const Tell&) override {
     try {
-      auto found = reader_.study_status(study);
+      auto found = reader_->study_status(study);
       const bool has_server = server::is_in_use(file_);
       for (auto& each : found) {
         if (!has_server && each.state() == "running") {
@@ -67,8 +88,8 @@ class Database : public Source {
 
  private:
   std::string file_;
-  server::Reader reader_;
-  server::QueryLimits limits_{UINT64_MAX, 0, std::int64_t{64} << 20U};
+  std::shared_ptr<server::Reader> reader_;
+  server::QueryLimits limits_ = server::kNoLimits;
 };
 
 }  // namespace

@@ -73,9 +73,9 @@ class Source {
   virtual std::string place() const = 0;
 };
 
-/// Opens a database file to read it directly. SQLite checks the time limit while it works, except
-/// in a few functions that only Ctrl-C can end. While rows are read, a server cannot truncate the
-/// write-ahead log of the database.
+/// Opens a database file to read it directly. While rows are read, a server cannot truncate the
+/// write-ahead log of the database. If a single SQL function exceeds the time limit, its thread
+/// runs until the process ends.
 std::unique_ptr<Source> open_database(const std::string& file,
                                       std::int64_t timeout_ms = DatabaseSettings().timeout_ms);
 

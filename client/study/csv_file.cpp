@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -97,7 +98,7 @@ void CsvFile::read_rows(std::string_view text) {
     } else if (is_quoted) {
       field += text[i];
       i += text[i] == '"' ? std::size_t{1} : 0;  // a quote inside a field is doubled
-    } else if (text[i] == '"' && trimmed(field).empty() && !follows_quote) {
+    } else if (text[i] == '"' && field.find_first_not_of(kBlank) == field.npos && !follows_quote) {
       is_quoted = true;
     } else if (text[i] == ',') {
       end_field();
@@ -127,12 +128,13 @@ void CsvFile::check_names() const {
                   [](const auto& name) { return solver::number_of(name).has_value(); })) {
     fail(line, "the first line contains numbers: it must name the columns");
   }
-  for (auto name = names.begin(); name != names.end(); ++name) {
-    if (name->empty()) {
-      fail(line, fmt::format("column {} has no name", name - names.begin() + 1));
+  std::set<std::string_view> earlier;
+  for (const std::string& name : names) {
+    if (name.empty()) {
+      fail(line, fmt::format("column {} has no name", earlier.size() + 1));
     }
-    if (std::find(names.begin(), name, *name) != name) {
-      fail(line, fmt::format("two columns are called `{}`", protocol::excerpt(*name)));
+    if (!earlier.insert(name).second) {
+      fail(line, fmt::format("two columns are called `{}`", protocol::excerpt(name)));
     }
   }
 }

@@ -164,15 +164,6 @@ bool exists(const std::string& path) {
   return std::filesystem::exists(std::filesystem::symlink_status(path));
 }
 
-Descriptor opened_folder_of(const std::string& path) {
-  const std::string folder = std::filesystem::absolute(path).parent_path();
-  Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (!opened.is_open()) {
-    fail_to("cannot open the folder", folder);
-  }
-  return opened;
-}
-
 /// Writes a new file of mode 0600, and syncs it and its folder. Deletes the file if that fails.
 void write_new_file(const std::string& path, std::string_view text) {
   const Descriptor file(
@@ -423,12 +414,22 @@ AuthorizedKey add_key(const std::string& folder, const std::string& name, Role r
   const KeyPair pair = public_key ? KeyPair{*public_key, {}} : generate_key_pair();
   AuthorizedKey added{name, role, pair.public_key,
                       fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)))};
-  change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
-    keys.add(added);
-    if (!public_key) {
-      write_key_file(key_file_in(folder, name), {role, name, pair, server.pair.public_key});
+  const std::string file = key_file_in(folder, name);
+  bool is_written = false;
+  try {
+    change_authorized_keys(authorized_keys_in(folder), [&](AuthorizedKeys& keys) {
+      keys.add(added);
+      if (!public_key) {
+        write_key_file(file, {role, name, pair, server.pair.public_key});
+        is_written = true;
+      }
+    });
+  } catch (...) {
+    if (is_written) {  // a key that is not on the list would only be in the way of the next attempt
+      ::unlink(file.c_str());
     }
-  });
+    throw;
+  }
   return added;
 }
 

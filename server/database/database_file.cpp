@@ -166,26 +166,28 @@ bool is_in_use(const std::string& path) {
 
 ServerFile::ServerFile(const std::string& path) : path_(fs::absolute(path).string()) {
   check_path(path);
-  file_ = ::open(path.c_str(), O_RDWR | O_CLOEXEC);
-  if (file_ < 0 && errno == ENOENT) {
-    file_ = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnerOnly);
-    is_new_ = file_ >= 0;
+  const std::string folder = fs::path(path_).parent_path().string();
+  if (::access(folder.c_str(), W_OK) != 0 && (errno == EACCES || errno == EROFS)) {
+    throw StorageError(fmt::format(
+        "the folder {} is read-only for this user ({}), and a server needs files beside its "
+        "database {}",
+        folder, std::strerror(errno), path));
   }
-  if (file_ < 0 || ::fstat(file_, &opened_) != 0) {
+  file_ = protocol::Descriptor(::open(path.c_str(), O_RDWR | O_CLOEXEC));
+  if (!file_.is_open() && errno == ENOENT) {
+    file_ = protocol::Descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kOwnerOnly));
+    is_new_ = file_.is_open();
+  }
+  if (!file_.is_open() || ::fstat(file_.number(), &opened_) != 0) {
     throw StorageError("cannot open the database " + path +
                        " for writing: " + std::strerror(errno));
   }
   struct flock lock = servers_lock();
-  if (::fcntl(file_, F_OFD_SETLK, &lock) != 0) {
-    ::close(file_);
+  if (::fcntl(file_.number(), F_OFD_SETLK, &lock) != 0) {
     throw StorageError(
         "another server, `oblique run` or `oblique view` already uses the database " + path +
         ": wait until it ends, or use another database");
   }
-}
-
-ServerFile::~ServerFile() {
-  ::close(file_);
 }
 
 void ServerFile::check() const {
@@ -219,6 +221,10 @@ void DraftFile::keep_as(const std::string& name) const {
   if (file.number() >= 0 && ::fsync(file.number()) == 0) {
     fs::rename(path_, name, error);
   } else {
+    error = std::error_code(errno, std::generic_category());
+  }
+  // EINVAL: the file system cannot sync folders
+  if (!error && ::fsync(protocol::opened_folder_of(name).number()) != 0 && errno != EINVAL) {
     error = std::error_code(errno, std::generic_category());
   }
   if (error) {

@@ -5,6 +5,7 @@
 
 #include <sys/stat.h>
 
+#include "proto/system/descriptor.h"
 #include "server/database/sqlite.h"
 
 // Functions that open, lock and complete database files.
@@ -49,7 +50,6 @@ class ServerFile {
   /// Opens the file at `path`, or creates it with mode 0600. This object must outlive every
   /// connection, because closing the file releases SQLite's locks. Throws StorageError.
   explicit ServerFile(const std::string& path);
-  ~ServerFile();
   ServerFile(const ServerFile&) = delete;
   ServerFile& operator=(const ServerFile&) = delete;
 
@@ -63,7 +63,7 @@ class ServerFile {
  private:
   std::string path_;  // absolute, because the current folder may be renamed
   bool is_new_ = false;
-  int file_ = -1;
+  protocol::Descriptor file_;
   struct stat opened_ {};
 };
 
@@ -79,7 +79,7 @@ class DraftFile {
 
   const std::string& path() const { return path_; }
 
-  /// Syncs the file and renames it to `name`. Throws StorageError.
+  /// Syncs the file, renames it to `name` and syncs the folder. Throws StorageError.
   void keep_as(const std::string& name) const;
 
  private:

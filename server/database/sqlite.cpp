@@ -16,18 +16,20 @@ constexpr const char* kAfterFailedSync =
     " (fsync). Nothing more is stored, and the server ends. Once the disk works, start the server "
     "again; running workers have kept all results that are not stored";
 
-constexpr const char* kWayOut =
-    ": the file is damaged. `oblique check --db FILE` lists the faults, and `oblique backup "
-    "SAVED.db "
-    "--db "
-    "FILE --salvage` saves all readable results; the other points are solved again";
-
-[[noreturn]] void fail(sqlite3* database, int code, std::string reason) {
-  check_sync(database, code);
-  if ((static_cast<unsigned>(code) & 0xffU) == SQLITE_CORRUPT) {
-    reason += kWayOut;
+[[noreturn]] void fail(sqlite3* database, int code, const std::string& reason) {
+  check_gone(database, code);
+  switch (static_cast<unsigned>(code) & 0xffU) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      throw StorageBusy("another program has locked the database: " + reason);
+    case SQLITE_ERROR:
+    case SQLITE_CONSTRAINT:
+    case SQLITE_MISMATCH:
+    case SQLITE_TOOBIG:
+      throw ChangeRefused("the database refused a statement: " + reason);
+    default:
+      throw StorageError("the database failed: " + reason);
   }
-  throw StorageError("the database failed: " + reason);
 }
 
 /// Returns SQLite's message for the last error, with the cause if a write reached a limit.
@@ -110,7 +112,15 @@ void row_checksum(sqlite3_context* context, int count, sqlite3_value** values) {
 
 }  // namespace
 
-void check_sync(sqlite3* database, int code) {
+bool is_damage(int code) {
+  const unsigned kind = static_cast<unsigned>(code) & 0xffU;
+  return kind == SQLITE_CORRUPT || kind == SQLITE_NOTADB || code == SQLITE_IOERR_CORRUPTFS;
+}
+
+void check_gone(sqlite3* database, int code) {
+  if (is_damage(code)) {
+    throw StorageGone(std::string("the database failed: ") + sqlite3_errmsg(database) + kWayOut);
+  }
   if (code == SQLITE_IOERR_FSYNC || code == SQLITE_IOERR_DIR_FSYNC) {
     const char* path = sqlite3_db_filename(database, "main");
     throw StorageGone(std::string("the disk failed to store changes of ") +
@@ -158,8 +168,7 @@ Statement::Statement(sqlite3* database, std::string_view sql) : database_(databa
 
 void Statement::check(int code) const {
   if (code != SQLITE_OK) {
-    throw StorageError("the database refused a statement: " +
-                       std::string(sqlite3_errmsg(database_)));
+    fail(database_, code, sqlite3_errmsg(database_));
   }
 }
 
@@ -249,12 +258,14 @@ DatabaseKind identify(sqlite3* database, const std::string& path) {
     application_id = pragma(database, "application_id");
     version = pragma(database, "user_version");
     has_tables = Statement(database, "SELECT 1 FROM sqlite_schema").step();
+  } catch (const StorageBusy&) {
+    throw;
   } catch (const StorageError&) {
     const int code = sqlite3_errcode(database);
     throw StorageError(code == SQLITE_NOTADB
                            ? path + " is not a database"
                            : "cannot read the database " + path + ": " + error_text(database) +
-                                 (code == SQLITE_CORRUPT ? kWayOut : ""));
+                                 (is_damage(code) ? kWayOut : ""));
   }
   if (application_id == 0 && version == 0 && !has_tables) {
     return DatabaseKind::kEmpty;

@@ -18,17 +18,37 @@ class StorageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The database file was deleted, renamed or replaced while it was open, or a sync failed. Nothing
-/// can be stored until the program is restarted: after a failed sync Linux marks the unwritten
-/// pages as clean, so a second sync succeeds without having stored them.
+/// The database file was deleted, renamed or replaced while it was open, it is damaged, or a sync
+/// failed. Nothing can be stored until the program is restarted: after a failed sync Linux marks
+/// the unwritten pages as clean, so a second sync succeeds without having stored them.
 class StorageGone : public StorageError {
  public:
   using StorageError::StorageError;
 };
 
-/// If `code` is the extended result code of a failed fsync, throws StorageGone, which names the
-/// file of the connection.
-void check_sync(sqlite3* database, int code);
+/// Another program has locked the database for longer than the connection waits.
+class StorageBusy : public StorageError {
+ public:
+  using StorageError::StorageError;
+};
+
+/// A change contradicts the file, so it fails at every attempt, unlike with a full disk.
+class ChangeRefused : public StorageError {
+ public:
+  using StorageError::StorageError;
+};
+
+/// Sentence after the reason for which a damaged file cannot be used: how to save its results.
+inline constexpr const char* kWayOut =
+    ": the file is damaged. `oblique check --db FILE` lists the faults, and `oblique backup "
+    "SAVED.db --db FILE --salvage` saves all readable results; the other points are solved again";
+
+/// Returns whether SQLite's result code reports a damaged file or file system.
+bool is_damage(int code);
+
+/// If `code` is the extended result code of a failed fsync or reports damage, throws StorageGone.
+/// The message names the file of the connection or the remedy.
+void check_gone(sqlite3* database, int code);
 
 struct CloseDatabase {
   void operator()(sqlite3* database) const { sqlite3_close_v2(database); }

@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frames.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/check.h"
 #include "server/store/completed_ranges.h"
 #include "server/store/result_rows.h"
+#include "server/store/schema.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
@@ -46,6 +49,10 @@ std::vector<std::string> texts(sqlite3* database, const std::string& sql) {
     found.push_back(rows.text(0));
   }
   return found;
+}
+
+std::vector<std::string> columns_of(sqlite3* database, const std::string& table) {
+  return texts(database, "SELECT name FROM pragma_table_info('" + table + "')");
 }
 
 /// A table with ascending integer keys, and the conditions for the rows to copy.
@@ -83,15 +90,18 @@ bool insert_row(sqlite3* to, Statement& insert, const Statement& row) {
 std::uint64_t copy_rows(sqlite3* from, sqlite3* to, const KeyedRows& rows, Salvaged& saved) {
   // Maximum step, larger than every key in use.
   constexpr std::int64_t kLongestLeap = std::int64_t{1} << 42U;
-  const std::string columns_sql = "SELECT name FROM pragma_table_info('" + rows.table + "')";
-  const std::vector<std::string> found = texts(from, columns_sql);
-  if (found.empty()) {
-    return 0;  // the damaged file has lost the table
-  }
+  const std::vector<std::string> found = columns_of(from, rows.table);
   std::vector<std::string> columns;
   std::vector<std::string> lost;  // missing columns; if there are any, rows get no checksum
-  for (const std::string& column : texts(to, columns_sql)) {
+  for (const std::string& column : columns_of(to, rows.table)) {
     (std::ranges::count(found, column) > 0 ? columns : lost).push_back(column);
+  }
+  if (!lost.empty()) {
+    saved.losses.insert(
+        fmt::format("the table {} has lost the columns {}", rows.table, fmt::join(lost, ", ")));
+  }
+  if (columns.empty()) {
+    return 0;  // the table itself is lost
   }
   if (!lost.empty() && std::erase(columns, "checksum") > 0) {
     lost.emplace_back("checksum");
@@ -134,6 +144,9 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   saved.studies = copy_rows(from, to, {.table = "studies", .key = "study_id"}, saved);
   copy_rows(from, to, {.table = "models", .key = "model_id"}, saved);
   copy_rows(from, to, {.table = "workers", .key = "worker_id"}, saved);
+  if (saved.unreadable_places > 0) {
+    saved.losses.insert("studies, models or workers are lost, with all results that need them");
+  }
   // Skips results of lost studies, because results mean nothing without a recipe.
   for (const std::string& study : texts(to, "SELECT study_id FROM studies")) {
     copy_rows(from, to,
@@ -146,12 +159,33 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
   }
 }
 
-/// Removes or repairs references to lost rows, and counts completed points. Clears wrong checksums
-/// of studies and models; `check` still compares results with recipes.
+/// Renames and pauses each study whose recipe, models or workers do not match their checksums,
+/// because its results may mean other points. Then clears these checksums.
+void set_changed_studies_aside(sqlite3* database, Salvaged& saved) {
+  const std::string changed = fmt::format(
+      " WHERE checksum <> {} OR study_id IN (SELECT study_id FROM results WHERE model_id IN"
+      " (SELECT model_id FROM models WHERE checksum <> {}) OR worker_id IN"
+      " (SELECT worker_id FROM workers WHERE checksum <> {}))",
+      kStudyChecksum, model_checksum_sql(), kWorkerChecksum);
+  for (std::string& loss :
+       texts(database,
+             "SELECT 'study ' || study_id || ', ' || name || ': its recipe, a model or a worker was"
+             " changed after it was stored, so its results may mean other points. It is paused and"
+             " called \"damaged study ' || study_id || '\" now' FROM studies" +
+                 changed)) {
+    saved.losses.insert(std::move(loss));
+  }
+  execute(database, fmt::format("UPDATE studies SET name = 'damaged study ' || study_id,"
+                                " state = 'paused'{};"
+                                "UPDATE studies SET checksum = NULL WHERE checksum <> {};"
+                                "UPDATE models SET checksum = NULL WHERE checksum <> {};"
+                                "UPDATE workers SET checksum = NULL WHERE checksum <> {};",
+                                changed, kStudyChecksum, model_checksum_sql(), kWorkerChecksum));
+}
+
+/// Removes or repairs references to lost rows, and counts completed points. `check` still compares
+/// results with recipes.
 void mend(sqlite3* database) {
-  execute(database, fmt::format("UPDATE studies SET checksum = NULL WHERE checksum <> {};"
-                                "UPDATE models SET checksum = NULL WHERE checksum <> {};",
-                                kStudyChecksum, model_checksum_sql()));
   execute(database,
           "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
           // Results keep the number of a lost worker, so that their checksums stay right. If all
@@ -169,6 +203,14 @@ void mend(sqlite3* database) {
   }
 }
 
+/// Lets SQLite read a file that is shorter than its header states, and every table whose definition
+/// it can parse.
+void ignore_damaged_schema(sqlite3* database) {
+  execute(database, "PRAGMA writable_schema = ON");
+  // If a definition cannot be parsed, the first statement fails, and later ones use the others.
+  sqlite3_exec(database, "SELECT 1 FROM sqlite_schema", nullptr, nullptr, nullptr);
+}
+
 void check_is_salvageable(sqlite3* database, const std::string& path) {
   try {
     if (identify(database, path) != DatabaseKind::kEmpty) {
@@ -183,10 +225,45 @@ void check_is_salvageable(sqlite3* database, const std::string& path) {
   throw StorageError(path + " is empty: it contains no study");
 }
 
+/// Opens a damaged file: a copy of its pages in `draft` or, if a page cannot be read, the file
+/// itself. In the copy all tables have our definitions, because a damaged one makes rows unreadable
+/// or gives columns wrong names; rows store values by their place. A table with another number of
+/// columns keeps its definition. `ours` has our tables.
+DatabaseHandle open_damaged(const std::string& from, const DraftFile& draft, sqlite3* ours) {
+  DatabaseHandle source = open_for_reading(from);
+  ignore_damaged_schema(source.get());
+  check_is_salvageable(source.get(), from);
+  try {
+    DatabaseHandle copy = open_database(draft.path(), SQLITE_OPEN_READWRITE);
+    copy_pages(source.get(), copy.get(), draft.path());
+    ignore_damaged_schema(copy.get());
+    for (const SchemaElement& element : compare_schema(copy.get()).lacking) {
+      const auto columns = columns_of(copy.get(), element.name).size();
+      if (element.type == "table" &&
+          (columns == 0 || columns == columns_of(ours, element.name).size())) {
+        execute_with(copy.get(),
+                     "UPDATE sqlite_schema SET type = 'table', name = ?1, tbl_name = ?1, sql = ?2"
+                     " WHERE rootpage > 0 AND type <> 'index' AND (name = ?1 OR sql = ?2)",
+                     element.name, element.sql);
+      }
+    }
+    execute(copy.get(),
+            "DELETE FROM sqlite_schema WHERE type <> 'table' AND sql IS NOT NULL;"
+            "PRAGMA writable_schema = RESET");
+    ignore_damaged_schema(copy.get());
+    return copy;
+  } catch (const StorageError&) {
+    return source;
+  }
+}
+
 }  // namespace
 
-void copy_into(const DraftFile& draft, const std::string& from, const std::string& to) {
-  const DatabaseHandle source = open_stored(from);
+std::vector<std::string> copy_into(const DraftFile& draft, const std::string& from,
+                                   const std::string& to) {
+  // Maximum size of a stored value. Values arrive in messages, whose size is limited.
+  constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
+  const DatabaseHandle source = open_with_schema(from);
   const DatabaseHandle copy =
       open_database(draft.path(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
   copy_pages(source.get(), copy.get(), to);
@@ -197,27 +274,29 @@ void copy_into(const DraftFile& draft, const std::string& from, const std::strin
   if (const auto faults = faults_of_pages(copy.get()); !faults.empty()) {
     throw StorageError(from + " is damaged and was not copied: " + faults.front());
   }
+  sqlite3_limit(copy.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
+  return diagnose_contents(copy.get()).faults;
 }
 
-void back_up(const std::string& from, const std::string& to) {
+std::vector<std::string> back_up(const std::string& from, const std::string& to) {
   check_is_new(to);
   const DraftFile draft(to + ".part");
-  copy_into(draft, from, to);
+  auto faults = copy_into(draft, from, to);
   draft.keep_as(to);
+  return faults;
 }
 
 Salvaged salvage(const std::string& from, const std::string& to) {
   check_is_new(to);
-  const DatabaseHandle source = open_for_reading(from);
-  // Makes SQLite read a file that is shorter than its header states.
-  execute(source.get(), "PRAGMA writable_schema = ON");
-  check_is_salvageable(source.get(), from);
   const DraftFile draft(to + ".part");
+  const DraftFile pages(to + ".pages");
   Salvaged saved;
   {
     Store target(draft.path());
+    const DatabaseHandle source = open_damaged(from, pages, target.connection());
     target.write([&] {
       copy_tables(source.get(), target.connection(), saved);
+      set_changed_studies_aside(target.connection(), saved);
       mend(target.connection());
     });
     saved.results = std::stoull(texts(target.connection(), "SELECT count(*) FROM results").at(0));

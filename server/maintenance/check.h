@@ -19,9 +19,10 @@ Diagnosis diagnose(const std::string& path);
 /// Returns the faults that SQLite finds in pages and indices of an open database, at most twenty.
 std::vector<std::string> faults_of_pages(sqlite3* database);
 
-/// Checks the definitions of our tables. If they are right, also checks all studies, models and
-/// results: checksums, references, lists, each row against the recipe of its study, and completed
-/// points and state of each study against its rows. Throws StorageError.
+/// Checks our definitions of tables, indices, triggers and views. If they are right, also checks
+/// all studies, models, workers and results: checksums, references, lists, each row against the
+/// recipe of its study, and completed points and state of each study against its rows. Throws
+/// StorageError.
 Diagnosis diagnose_contents(sqlite3* database);
 
 /// Returns an SQL expression for the fault of a row of `results`; its value is NULL for a sound

@@ -7,12 +7,10 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "proto/frames.h"
 #include "proto/recipe/model_message.h"
 #include "server/database/database_file.h"
 #include "server/database/sqlite.h"
 #include "server/maintenance/backup.h"
-#include "server/maintenance/check.h"
 #include "server/store/completed_ranges.h"
 #include "server/store/result_rows.h"
 #include "server/store/schema.h"
@@ -20,20 +18,6 @@
 
 namespace oblique::server {
 namespace {
-
-/// Opens the copy of a source. Throws StorageError for wrong columns or damaged rows.
-DatabaseHandle open_sound_source(const std::string& path) {
-  // Maximum size of a stored value. Values arrive in messages, whose size is limited.
-  constexpr int kLongestValue = static_cast<int>(2 * protocol::kMaxFrameBytes);
-  DatabaseHandle database = open_database(path, SQLITE_OPEN_READONLY);
-  sqlite3_limit(database.get(), SQLITE_LIMIT_LENGTH, kLongestValue);
-  if (const auto faults = diagnose_contents(database.get()).faults; !faults.empty()) {
-    throw StorageError(faults.front() +
-                       ": `oblique check` lists all faults, and `oblique backup --salvage` makes a "
-                       "file that can be merged");
-  }
-  return database;
-}
 
 struct StudyRow {
   std::uint64_t id;
@@ -260,10 +244,15 @@ class SourceMerge {
 
 Merged Merger::merge(const std::string& source, const std::string& rename_prefix) {
   const DraftFile copy(path_ + ".merging");
-  copy_into(copy, source, copy.path());
+  const auto faults = copy_into(copy, source, copy.path());
   Merged merged;
   try {
-    const DatabaseHandle opened = open_sound_source(copy.path());
+    if (!faults.empty()) {
+      throw StorageError(faults.front() +
+                         ": `oblique check` lists all faults, and `oblique backup --salvage` makes "
+                         "a file that can be merged");
+    }
+    const DatabaseHandle opened = open_database(copy.path(), SQLITE_OPEN_READONLY);
     execute_with(target_.connection(), "ATTACH ? AS source", copy.path());
     const auto detach = [](sqlite3* database) {
       sqlite3_exec(database, "DETACH source", nullptr, nullptr, nullptr);

@@ -3,14 +3,14 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/model_message.h"
-#include "server/database/database_file.h"
+#include "server/store/schema.h"
 #include "server/store/store.h"
 
 namespace oblique::server {
 namespace {
 
 std::string recipe_bytes(const std::string& path, std::uint64_t study_id) {
-  const DatabaseHandle database = open_stored(path);
+  const DatabaseHandle database = open_with_schema(path);
   Statement find(database.get(), "SELECT recipe FROM studies WHERE study_id = ?");
   find.bind_all(study_id);
   if (!find.step()) {

@@ -8,11 +8,13 @@
 #include <cstring>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -65,19 +67,44 @@ std::string descriptor_error(const std::string& text) {
              : "\"" + text + "\" is not an open file descriptor";
 }
 
-/// Writes the endpoints as a line of JSON to the descriptor given by --ready-fd.
+/// Writes a line of JSON to the descriptor given by --ready-fd, if there is one.
+void write_line(int fd, const nlohmann::json& object) {
+  const std::string line = object.dump(-1, ' ', true) + "\n";
+  if (fd >= 0 && ::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
+    throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
+                             std::string(std::strerror(errno)));
+  }
+}
+
 void write_endpoints(int fd, const EventLoop& loop) {
   nlohmann::json endpoints{{"client", loop.client_endpoint()}, {"worker", loop.worker_endpoint()}};
   if (!loop.http_url().empty()) {
     endpoints["http"] = loop.http_url();
     endpoints["page"] = loop.page_url();
   }
-  const std::string line = endpoints.dump(-1, ' ', true) + "\n";
-  if (::write(fd, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
-    throw std::runtime_error("cannot write to the file descriptor of --ready-fd: " +
-                             std::string(std::strerror(errno)));
-  }
+  write_line(fd, endpoints);
   ::close(fd);
+}
+
+/// Opens the database and the ports. While another program has locked the database, reports that
+/// once and tries again. Returns null when a signal arrives meanwhile.
+std::unique_ptr<EventLoop> open_loop(const LoopSettings& settings, int ready_fd,
+                                     oblique::protocol::StopSignals& stop) {
+  constexpr std::chrono::milliseconds kPause{500};
+  for (bool is_reported = false; !stop.wait(std::chrono::milliseconds(0));) {
+    try {
+      return std::make_unique<EventLoop>(settings);
+    } catch (const oblique::server::StorageBusy&) {
+      const std::string reason = fmt::format(
+          "another program has locked the database {}: waiting until it ends", settings.database);
+      if (!std::exchange(is_reported, true)) {
+        spdlog::warn("{}", reason);
+        write_line(ready_fd, {{"waits_for", reason}});
+      }
+      stop.wait(kPause);
+    }
+  }
+  return nullptr;
 }
 
 /// Reports the state of the loop to the service manager.
@@ -108,7 +135,11 @@ int run(LoopSettings settings, int ready_fd, pid_t parent) {
   settings.on_turn = [&notifier, drain = settings.drain](const LoopState& state) {
     notify(notifier, state, drain);
   };
-  EventLoop loop(settings);
+  const auto opened = open_loop(settings, ready_fd, stop);
+  if (opened == nullptr) {
+    return oblique::protocol::kDone;
+  }
+  EventLoop& loop = *opened;
   spdlog::info("database {}, clients at {}, workers at {}, metrics at {}", settings.database,
                loop.client_endpoint(), loop.worker_endpoint(),
                loop.http_url().empty() ? "no address" : loop.http_url() + "/metrics");
@@ -179,7 +210,7 @@ void add_options(CLI::App& app, Configuration& configuration, pid_t& parent, Opt
       ->check(port);
   app.add_option("--ready-fd", options.ready_fd,
                  "File descriptor to which the server writes one line of JSON with both endpoints "
-                 "when it is ready; -1: none")
+                 "when it is ready, and before that a line with waits_for; -1: none")
       ->check(descriptor_error)
       ->configurable(false);
   options.http.add_to(app);

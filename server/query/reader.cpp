@@ -10,9 +10,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/text.h"
-#include "server/database/database_file.h"
 #include "server/query/plan.h"
 #include "server/query/sql_text.h"
+#include "server/store/schema.h"
 
 namespace oblique::server {
 namespace {
@@ -164,7 +164,8 @@ QueryError failure(sqlite3* database, int code) {
       return QueryError(fmt::format("a text, blob or row of the query exceeds the allowed {} MiB",
                                     sqlite3_limit(database, SQLITE_LIMIT_LENGTH, -1) >> 20));
     default:
-      return QueryError(std::string("the query failed: ") + sqlite3_errmsg(database));
+      return QueryError(std::string("the query failed: ") + sqlite3_errmsg(database) +
+                        (is_damage(code) ? kWayOut : ""));
   }
 }
 
@@ -266,7 +267,7 @@ std::string hexadecimal(std::string_view bytes) {
   return text += '\'';
 }
 
-Reader::Reader(const std::string& path) : database_(open_stored(path)) {
+Reader::Reader(const std::string& path) : database_(open_with_schema(path)) {
   restrict_to_reading(database_.get());
   constexpr int kInstructionsPerCheck = 10'000;  // instructions of SQLite's virtual machine
   const auto is_over = [](void* time) {

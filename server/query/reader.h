@@ -46,8 +46,8 @@ struct QueryLimits {
   std::int64_t longest_chunk_ms = 250;
 };
 
-/// Only SQLite's own limits, for statements of trusted programs.
-inline constexpr QueryLimits kNoLimits{UINT64_MAX, 0, 1'000'000'000};
+/// Limits of a query that a program runs on a file for its own user.
+inline constexpr QueryLimits kNoLimits{UINT64_MAX, 0, std::int64_t{64} << 20U};
 
 /// Maximum time limit that a client can request.
 inline constexpr std::int64_t kLongestTimeLimit_ms = 600'000;

@@ -18,15 +18,21 @@ namespace {
 constexpr std::uint64_t kPart = 4096;
 
 /// Selects study, point and study name of the first row of another study that has these inputs, is
-/// solved and has a correct checksum.
+/// solved and has a correct checksum, as its worker has. `i` is an entry of the index and `r` the
+/// row itself, because one of them may be damaged. The unary plus keeps SQLite from reading the
+/// inputs of `r` in the index.
 std::string find_sql() {
   return fmt::format(
-      "SELECT r.study_id, r.point, s.name FROM results AS r INDEXED BY solved_points"
-      " CROSS JOIN studies AS s USING (study_id) CROSS JOIN workers AS w USING (worker_id)"
-      " WHERE r.model_id = ?1 AND r.H = ?2 AND r.mu = ?3 AND r.e = ?4 AND r.error IS NULL"
-      " AND r.study_id <> ?5 AND w.solver_version = ?6 AND s.errors = ?7"
-      " AND r.checksum = row_checksum(r.{}) ORDER BY r.study_id, r.point LIMIT 1",
-      fmt::join(result_columns(), ", r."));
+      "SELECT r.study_id, r.point, s.name FROM results AS i INDEXED BY solved_points"
+      " CROSS JOIN results AS r ON r.study_id = i.study_id AND r.point = i.point"
+      " CROSS JOIN studies AS s ON s.study_id = r.study_id"
+      " WHERE i.model_id = ?1 AND i.H = ?2 AND i.mu = ?3 AND i.e = ?4 AND i.error IS NULL"
+      " AND +r.model_id = ?1 AND +r.H = ?2 AND +r.mu = ?3 AND +r.e = ?4 AND r.error IS NULL"
+      " AND r.study_id <> ?5 AND s.errors = ?7 AND EXISTS (SELECT 1 FROM workers WHERE"
+      " worker_id = r.worker_id AND solver_version = ?6 AND checksum = {})"
+      " AND r.checksum = row_checksum(r.{})"
+      " ORDER BY i.study_id, i.point LIMIT 1",
+      kWorkerChecksum, fmt::join(result_columns(), ", r."));
 }
 
 /// Copies a row for study ?1 and point ?2, with ?3 as `reused_from`.

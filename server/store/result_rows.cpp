@@ -206,7 +206,9 @@ void ResultInsert::put_lists(const solver::CaseResult& result) {
 }
 
 ModelRows::ModelRows(sqlite3* database)
-    : find_(database, "SELECT model_id FROM models WHERE definition = ?"),
+    : find_(database,
+            fmt::format("SELECT model_id, checksum <> {} FROM models WHERE definition = ?",
+                        model_checksum_sql())),
       insert_(database, insert_sql("models", model_columns(), "definition")) {}
 
 std::int64_t ModelRows::find(const solver::ModelParameters& model) {
@@ -216,7 +218,14 @@ std::int64_t ModelRows::find(const solver::ModelParameters& model) {
 std::int64_t ModelRows::find(std::string_view definition) {
   find_.bind_all(definition);
   const std::int64_t model_id = find_.step() ? find_.integer(0) : 0;
+  const bool is_damaged = model_id != 0 && find_.integer(1) != 0;
   find_.reset();
+  if (is_damaged) {
+    throw StorageGone(
+        fmt::format("model {} was changed after it was stored, and no result may refer "
+                    "to it{}",
+                    model_id, kWayOut));
+  }
   return model_id;
 }
 

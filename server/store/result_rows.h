@@ -30,6 +30,8 @@ std::string result_checksum_sql();
 std::string model_checksum_sql();
 inline constexpr const char* kStudyChecksum =
     "row_checksum(study_id, recipe, points, errors, created_at)";
+inline constexpr const char* kWorkerChecksum =
+    "row_checksum(name, threads, solver_version, instruction_set, joined_at)";
 
 /// Inserts rows with checksums into `results`.
 class ResultInsert {
@@ -63,9 +65,10 @@ class ModelRows {
   /// The connection must outlive this object.
   explicit ModelRows(sqlite3* database);
 
-  /// Returns the number of the model's row; 0 if there is no row. Throws StorageError.
+  /// Returns the number of the model's row; 0 if there is no row. Throws StorageGone for a row that
+  /// does not match its checksum, because new results must not refer to it.
   std::int64_t find(const solver::ModelParameters& model);
-  /// Returns the number of the model's row. Inserts a missing row. Throws StorageError.
+  /// Returns the number of the model's row. Inserts a missing row. Throws the errors of `find`.
   std::int64_t find_or_insert(const solver::ModelParameters& model);
 
  private:

@@ -7,15 +7,35 @@
 
 namespace oblique::server {
 
-/// Creates the tables in an empty database and gives it a random ID. Throws StorageError.
+/// Creates all tables, indices and views in an empty database and gives it a random ID. Throws
+/// StorageError.
 void create_tables(sqlite3* database);
 
-/// Recreates the views and the trigger of this schema, and creates missing indices. Does not change
-/// objects with other names. Throws StorageError, for example if a table has the name of a view.
-void create_views(sqlite3* database);
+/// A row of `sqlite_schema`.
+struct SchemaElement {
+  std::string type, name, table, sql;
+  bool operator==(const SchemaElement&) const = default;
+};
 
-/// Returns the tables of this schema that are missing or have other columns. Throws StorageError.
-std::vector<std::string> differing_tables(sqlite3* database);
+struct SchemaDifferences {
+  /// our tables that the file lacks or defines otherwise; if there are none, other such elements
+  std::vector<SchemaElement> lacking;
+  std::vector<SchemaElement> foreign;  ///< elements of other programs
+};
+
+/// Compares the text of every definition in a file with this schema. Throws StorageError.
+SchemaDifferences compare_schema(sqlite3* database);
+
+/// Returns a sentence about an element that a file lacks or defines otherwise.
+std::string fault_of(const SchemaElement& lacking);
+
+/// Works like `open_stored`, but also throws StorageError if the file lacks one of our definitions
+/// or has it changed, because then answers may be wrong.
+DatabaseHandle open_with_schema(const std::string& path);
+
+/// Makes indices, triggers and views again that the file lacks or defines otherwise. Throws
+/// StorageError if a table differs, or if a table has the name of a view.
+void restore_schema(sqlite3* database, const std::string& path);
 
 /// An SQL expression for the highest study number that was ever used, or 0. It also considers rows
 /// of `results` whose study was deleted by hand.

@@ -1,6 +1,7 @@
 -- The database is a public interface: any SQLite tool can read it while a study runs. SI units, named in
 -- the columns; times count from touch unless a name says otherwise. PRAGMA application_id identifies the
--- program, PRAGMA user_version is the number of this schema.
+-- program, PRAGMA user_version is the number of this schema. A file whose stored text differs from this one is
+-- refused, so any change inside a statement, of a comment too, raises that number.
 
 -- One row. Workers compare database_id with that of the database that their results are for.
 CREATE TABLE about (
@@ -60,7 +61,8 @@ CREATE TABLE workers (
   threads         INTEGER NOT NULL,    -- number of solver threads
   solver_version  TEXT NOT NULL,       -- of all its results
   instruction_set TEXT NOT NULL,       -- vector instructions used
-  joined_at       TEXT NOT NULL        -- UTC, ISO 8601
+  joined_at       TEXT NOT NULL,       -- UTC, ISO 8601
+  checksum        INTEGER              -- CRC-32 of the other columns, worker_id excepted; NULL after a change by hand
 ) STRICT;
 
 -- One row for each solved or failed point. Outputs of a failed point are NULL and `error` says why. Lists are
@@ -95,7 +97,9 @@ CREATE TABLE results (
   solved_at        TEXT NOT NULL, -- UTC, ISO 8601
   reused_from      TEXT,          -- STUDY/POINT that this result was copied from, by its name then; NULL: not a copy
   checksum         INTEGER,       -- CRC-32 of the other columns; NULL after a change by hand
-  PRIMARY KEY (study_id, point)
+  PRIMARY KEY (study_id, point),
+  CHECK (length(error) <= 65536 AND length(mode) <= 65536 AND length(major_mode) <= 65536
+         AND length(margin_event) <= 65536)
 ) STRICT, WITHOUT ROWID;
 
 -- Completed points as ranges: points with a row, and points that `where` leaves out.
@@ -118,3 +122,14 @@ CREATE TABLE reused_points (
 CREATE TABLE deletions (
   study_id    INTEGER PRIMARY KEY -- number of the study
 ) STRICT;
+
+CREATE INDEX failed_points ON results (study_id, point) WHERE error IS NOT NULL;
+-- For the lookup of results that another study can reuse.
+CREATE INDEX solved_points ON results (model_id, H, mu, e) WHERE error IS NULL;
+
+-- After rows were deleted by hand, makes the next server count the study's rows again.
+CREATE TRIGGER row_deleted AFTER DELETE ON results
+WHEN (SELECT counted FROM studies WHERE study_id = OLD.study_id)
+BEGIN
+  UPDATE studies SET counted = 0 WHERE study_id = OLD.study_id;
+END;

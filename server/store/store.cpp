@@ -44,37 +44,15 @@ Store::Store(const std::string& path)
   log_->rewrite();
   if (kind == DatabaseKind::kEmpty) {
     create_tables(database);
-  }
-  prepare_schema(path);
-  if (kind == DatabaseKind::kEmpty) {
     log_->merge();  // empties the log, so that the new file contains the whole database
   }
+  restore_schema(database, path);
   in_transaction(true, [this] {
     count_completed_points(database_.get());
     remove_orphans();
   });
   statements_ = std::make_unique<Statements>(database);
   ranges_ = std::make_unique<CompletedRanges>(database);
-}
-
-/// Creates the views. Throws StorageError if a table is missing or has other columns.
-void Store::prepare_schema(const std::string& path) {
-  if (const auto tables = differing_tables(database_.get()); !tables.empty()) {
-    throw StorageError(fmt::format(
-        "in {} the table {} is missing or has other columns: `oblique backup SAVED.db --db {} "
-        "--salvage` makes a file with all readable rows",
-        path, fmt::join(tables, " and "), path));
-  }
-  try {
-    create_views(database_.get());
-  } catch (const StorageGone&) {
-    throw;
-  } catch (const StorageError& error) {
-    throw StorageError(
-        fmt::format("the views of {} cannot be created: {}. If a table has the name of a view, "
-                    "rename the table",
-                    path, error.what()));
-  }
 }
 
 Store::~Store() {
@@ -279,7 +257,8 @@ void Store::add(const SetStudyState& change) {
 void Store::add(const AddWorker& change) {
   execute_with(database_.get(),
                "INSERT INTO workers (worker_id, name, threads, solver_version, instruction_set,"
-               " joined_at) VALUES (?, ?, ?, ?, ?, ?)",
+               " joined_at, checksum)"
+               " VALUES (?1, ?2, ?3, ?4, ?5, ?6, row_checksum(?2, ?3, ?4, ?5, ?6))",
                change.worker_id, change.name, change.threads, change.solver_version,
                change.instruction_set, change.joined_at);
 }

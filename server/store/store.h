@@ -97,7 +97,6 @@ class Store final : public Storage {
   void add(const EndReuse& change);
   void add(const AddWorker& change);
   void add(const AddResults& change);
-  void prepare_schema(const std::string& path);
   /// Runs `work` and sets `sync_failed_` if a sync fails.
   void guard_syncs(const std::function<void()>& work);
   void in_transaction(bool full_sync, const std::function<void()>& work);

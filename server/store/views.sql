@@ -1,45 +1,30 @@
--- Indices, the trigger and the views, recreated when a server starts. Views of users are kept.
-
-CREATE INDEX IF NOT EXISTS failed_points ON results (study_id, point) WHERE error IS NOT NULL;
--- For the lookup of results that another study can reuse.
-CREATE INDEX IF NOT EXISTS solved_points ON results (model_id, H, mu, e) WHERE error IS NULL;
-
--- After rows were deleted by hand, makes the next server count the study's rows again.
-DROP TRIGGER IF EXISTS row_deleted;
-CREATE TRIGGER row_deleted AFTER DELETE ON results
-WHEN (SELECT counted FROM studies WHERE study_id = OLD.study_id)
-BEGIN
-  UPDATE studies SET counted = 0 WHERE study_id = OLD.study_id;
-END;
+-- The views. A server whose file lacks one of them, or has another one of that name, makes it again. They come
+-- before the tables: SQLite compares its list of free pages with all pages in use only if the newest elements of
+-- the schema are tables.
 
 -- JSON writes whole numbers without a point; the casts keep them real numbers in SQL.
-DROP VIEW IF EXISTS peaks;
 CREATE VIEW peaks AS
 SELECT r.study_id, r.point, p.key AS seq, CAST(p.value ->> 0 AS REAL) AS t_s, CAST(p.value ->> 1 AS REAL) AS fn_N,
        CAST(p.value ->> 2 AS REAL) AS ft_N, p.value ->> 3 AS major
 FROM results AS r, json_each(r.peaks) AS p;
 
-DROP VIEW IF EXISTS phases;
 CREATE VIEW phases AS
 SELECT r.study_id, r.point, p.key AS seq, CASE p.key % 2 WHEN 0 THEN 'compression' ELSE 'restitution' END AS kind,
        CASE p.key WHEN 0 THEN 0.0 ELSE CAST(r.phases ->> (p.key - 1) AS REAL) END AS t0_s,
        CAST(p.value AS REAL) AS t1_s
 FROM results AS r, json_each(r.phases) AS p;
 
-DROP VIEW IF EXISTS stick_intervals;
 CREATE VIEW stick_intervals AS
 SELECT r.study_id, r.point, s.key AS seq, CAST(s.value ->> 0 AS REAL) AS t0_s, CAST(s.value ->> 1 AS REAL) AS t1_s
 FROM results AS r, json_each(r.stick_intervals) AS s;
 
 -- `seq` 0 is the pin O, 1 the first joint from there.
-DROP VIEW IF EXISTS reaction_peaks;
 CREATE VIEW reaction_peaks AS
 SELECT r.study_id, r.point, f.key AS seq, CAST(f.value ->> 0 AS REAL) AS t_s, CAST(f.value ->> 1 AS REAL) AS force_N
 FROM results AS r, json_each(r.reaction_peaks) AS f;
 
 -- Study name, results, all lists, worker and model in one row. Young's modulus is called E_Pa,
 -- because column names do not distinguish E from e.
-DROP VIEW IF EXISTS runs;
 CREATE VIEW runs AS
 SELECT s.name AS study, r.study_id, r.point, r.H, r.mu, r.e, r.status, r.error, r.fall_time_s, r.impact_x_m,
        r.vt_in_m_s, r.vn_in_m_s, r.duration_s, r.fn_peak_N, r.ft_peak_N, r.major_peak_1_N, r.major_peak_2_N,

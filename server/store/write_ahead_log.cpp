@@ -57,7 +57,7 @@ void WriteAheadLog::rewrite() {
 
 int WriteAheadLog::checkpoint(int mode, int* in_log, int* copied) {
   const int code = sqlite3_wal_checkpoint_v2(database_, "main", mode, in_log, copied);
-  check_sync(database_, code);
+  check_gone(database_, code);
   return code;
 }
 

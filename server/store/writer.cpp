@@ -232,7 +232,7 @@ void GroupCommit::note_committed(std::span<const Change> changes) {
   }
 }
 
-void GroupCommit::note_gone(const StorageGone& error, std::vector<WriteReport>& reports) {
+void GroupCommit::note_gone(const std::exception& error, std::vector<WriteReport>& reports) {
   gone_ = true;
   reports.push_back({WriteReport::Kind::kGone, 0, error.what()});
 }
@@ -305,10 +305,13 @@ void GroupCommit::write_singly(std::deque<WriteJob>& jobs, std::vector<WriteRepo
     } catch (const std::exception& error) {
       if (job.answer_failure) {
         reports.push_back({WriteReport::Kind::kRefused, job.ticket, error.what()});
-      } else {
-        fault = error.what();
-        keep(job);
+        continue;
       }
+      if (dynamic_cast<const ChangeRefused*>(&error) != nullptr) {  // waiting does not help
+        note_gone(error, reports);
+      }
+      fault = error.what();
+      keep(job);
     }
   }
   jobs = std::move(kept);

@@ -58,7 +58,9 @@ struct WriteReport {
     kRefused,    ///< the job failed and was dropped; `error` has the reason
     kFault,      ///< the database accepts no changes and jobs wait; reported once
     kRecovered,  ///< the database accepts changes again
-    kGone,       ///< the file is gone or a sync failed, so nothing more is written; reported once
+    /// the file is gone or damaged, a sync failed, or a result contradicts the file, so nothing
+    /// more is written; reported once
+    kGone,
     /// the log cannot be merged, see `error`; reported once per finished study and at the end
     kUnmerged,
   };
@@ -114,7 +116,7 @@ class GroupCommit {
   void write_singly(std::deque<WriteJob>& jobs, std::vector<WriteReport>& reports);
 
   void note_committed(std::span<const Change> changes);
-  void note_gone(const StorageGone& error, std::vector<WriteReport>& reports);
+  void note_gone(const std::exception& error, std::vector<WriteReport>& reports);
 
   Storage& storage_;
   std::uint64_t rows_ = 0;

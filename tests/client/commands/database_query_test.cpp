@@ -62,6 +62,19 @@ TEST_F(DatabaseQuery, AStatementHasATimeLimit) {
   EXPECT_THAT(outcome.err, HasSubstr("took more than 0.2 s"));
 }
 
+TEST_F(DatabaseQuery, TheTimeLimitAlsoEndsASingleFunctionThatTakesHours) {
+  const std::string hours =
+      "instr(zeroblob(30000000), CAST(zeroblob(15000000) || x'01' AS BLOB)) > 5";
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"sql", "SELECT " + hours}, {"query", "a", "--where", hours}}) {
+    auto arguments = words;
+    arguments.insert(arguments.end(), {"--timeout", "0.2"});
+    const auto outcome = run_command(arguments);
+    EXPECT_EQ(outcome.exit_code, 1) << words[0];
+    EXPECT_THAT(outcome.err, HasSubstr("took more than 0.2 s")) << words[0];
+  }
+}
+
 TEST_F(DatabaseQuery, AStatementHasAMemoryLimit) {
   EXPECT_THAT(run_command({"sql", "SELECT hex(zeroblob(450000000))"}).err,
               HasSubstr("exceeds the allowed 64 MiB"));
@@ -71,6 +84,40 @@ TEST_F(DatabaseQuery, AStatementHasAMemoryLimit) {
                    "SELECT b FROM (SELECT hex(zeroblob(500000)) || i AS b FROM n) ORDER BY b"});
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_THAT(outcome.err, HasSubstr("more memory than the 1024 MiB allowed"));
+}
+
+TEST_F(DatabaseQuery, ABackupOfADamagedFileNamesTheFaultsAndExitsWith1) {
+  EXPECT_EQ(run_command({"backup", "sound.db"}).exit_code, 0);
+  const std::string file = (folder_.path() / "oblique.db").string();
+  server::execute(server::open_database(file, SQLITE_OPEN_READWRITE).get(),
+                  "UPDATE results SET mu = 2 WHERE point = 1; UPDATE models SET E = 1");
+  const auto copied = run_command({"backup", "copy.db"});
+  EXPECT_EQ(copied.exit_code, 1);
+  EXPECT_THAT(copied.err, testing::AllOf(HasSubstr("point 1: its row was changed"),
+                                         HasSubstr("and so is its copy")));
+  const auto saved = run_command({"backup", "saved.db", "--salvage"});
+  EXPECT_EQ(saved.exit_code, 1);
+  EXPECT_THAT(saved.err, HasSubstr("called \"damaged study 1\" now"));
+}
+
+TEST_F(DatabaseQuery, AFileWhoseViewWasChangedIsRefusedByName) {
+  const std::string file = (folder_.path() / "oblique.db").string();
+  server::execute(server::open_database(file, SQLITE_OPEN_READWRITE).get(),
+                  "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET"
+                  " sql = replace(sql, 'm.E AS', 'm.A AS') WHERE name = 'runs'");
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"query", "a"},
+                                                {"sql", "SELECT E_Pa FROM runs"},
+                                                {"status"},
+                                                {"check"},
+                                                {"backup", "copy.db"},
+                                                {"merge", "oblique.db", "--db", "all.db"},
+                                                {"describe", "a"},
+                                                {"doctor"}}) {
+    const auto outcome = run_command(words);
+    EXPECT_EQ(outcome.exit_code, 1) << words[0];
+    EXPECT_THAT(outcome.out + outcome.err, HasSubstr("the view runs is missing or was changed"))
+        << words[0];
+  }
 }
 
 TEST_F(DatabaseQuery, AWrongStatementIsWrongUsage) {

@@ -19,6 +19,7 @@
 #include "tests/client/study/fake_reach.h"
 #include "tests/support/points.h"
 #include "tests/support/programs.h"
+#include "tests/support/stored_study.h"
 
 namespace oblique::client {
 namespace {
@@ -198,6 +199,43 @@ TEST(Run, PrintsTheOutputOfAServerThatDoesNotStart) {
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.err.find("the server did not start"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("oblique.db"), std::string::npos) << outcome.err;
+}
+
+TEST(Run, WaitsWhileAnotherProgramHasLockedTheDatabaseAndSaysSo) {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.file("oblique.db");
+  { const server::Store store(file); }
+  const auto other = server::open_database(file, SQLITE_OPEN_READWRITE);
+  server::execute(other.get(), "BEGIN IMMEDIATE");
+  test::Process run(folder, test::client_program(),
+                    {"run", "--preset", "paper", "--H", "1", "--mu", "0.4", "--e", "1"});
+  wait_for([&] {
+    return run.err().find("another program has locked the database") != std::string::npos;
+  });
+  server::execute(other.get(), "COMMIT");
+  EXPECT_EQ(run.wait(), 0) << run.err();
+}
+
+TEST(Run, OfADatabaseThatSqliteFindsDamagedEndsWithTheRemedyAlsoWhenQuiet) {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.file("oblique.db");
+  {
+    server::Store store(file);
+    test::add_study(store, "a", 1000, 1000);
+    const server::Change deletion = server::DeleteStudy{1};
+    store.commit({&deletion, 1});
+    while (store.clear_away(1000) != server::ClearedAway::kAll) {
+    }
+  }
+  std::fstream(file, std::ios::in | std::ios::out | std::ios::binary)
+      .seekp(35)
+      .put('\x01');  // the first free page is page 1 now
+  std::ofstream(folder.path() / "study.toml")
+      << "name = 'many'\n[model]\npreset = 'paper'\n[[block]]\nH = 1\nmu = { from = 0.1, to = 2, "
+         "count = 200 }\ne = 0.9\n";
+  const auto outcome = test::run_oblique(folder, {"run", "study.toml", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_THAT(outcome.err, testing::AllOf(HasSubstr("malformed"), HasSubstr("--salvage")));
 }
 
 constexpr const char* kBegun = R"(name = "begun"

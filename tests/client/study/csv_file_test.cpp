@@ -80,6 +80,21 @@ TEST(CsvFile, NeedsColumnNames) {
   EXPECT_THAT(csv_error("drop\n\xff\n"), HasSubstr("UTF-8"));
 }
 
+TEST(CsvFile, MayHaveManyColumnsAndFieldsWithManyQuotes) {
+  std::string names;
+  std::string values;
+  for (int i = 0; i < 300'000; ++i) {
+    names += "c" + std::to_string(i) + ",";
+    values += "1,";
+  }
+  EXPECT_THAT(column(names + "drop\n" + values + "0.25\n", "drop"), testing::ElementsAre(0.25));
+  std::string quotes;
+  for (int i = 0; i < 1'000'000; ++i) {
+    quotes += "a\"";
+  }
+  EXPECT_THAT(column("text,drop\n" + quotes + ",0.5\n", "drop"), testing::ElementsAre(0.5));
+}
+
 TEST(CsvFiles, AreFoundBesideTheStudyAndMustBeFiles) {
   const test::TemporaryFolder folder;
   { std::ofstream(folder.file("beside.csv")) << "drop\n0.4\n"; }

@@ -384,6 +384,12 @@ TEST_F(KeyFolderTest, AKeyIsNeitherListedWithoutItsFileNorWrittenWithoutBeingLis
   EXPECT_THROW(add_key(keys_, "server", Role::kWorker, std::nullopt), std::runtime_error);
   EXPECT_THAT(read_authorized_keys(authorized_keys_in(keys_)).all(), SizeIs(3));
   EXPECT_EQ(files(), 6);
+  const std::string draft = authorized_keys_in(keys_) + ".new";
+  std::filesystem::create_directory(draft);  // so the list cannot be replaced
+  EXPECT_THROW(add_key(keys_, "carol", Role::kClient, std::nullopt), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(key_file_in(keys_, "carol")));
+  std::filesystem::remove(draft);
+  EXPECT_NO_THROW(add_key(keys_, "carol", Role::kClient, std::nullopt));
 }
 
 }  // namespace

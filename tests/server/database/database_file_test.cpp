@@ -5,8 +5,10 @@
 #include <functional>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -16,6 +18,26 @@
 #include "server/maintenance/check.h"
 #include "server/query/reader.h"
 #include "tests/server/store/store_fixture.h"
+
+namespace {
+
+/// Returns the folders that this process has synced.
+std::vector<std::string>& synced_folders() {
+  static std::vector<std::string> folders;
+  return folders;
+}
+
+}  // namespace
+
+/// Replaces the function of the C library, so that tests see which folders are synced.
+extern "C" int fsync(int descriptor) {
+  struct stat about {};
+  if (::fstat(descriptor, &about) == 0 && S_ISDIR(about.st_mode)) {
+    synced_folders().push_back(
+        std::filesystem::read_symlink("/proc/self/fd/" + std::to_string(descriptor)).string());
+  }
+  return static_cast<int>(::syscall(SYS_fsync, descriptor));
+}
 
 namespace oblique::server {
 namespace {
@@ -105,6 +127,26 @@ TEST_F(ReadOnlyFolderTest, PermissionDeniedIsReportedWithTheRemedy) {
   ::chmod(file.c_str(), ::geteuid() == 0 ? 0600 : 0);
   EXPECT_EXIT(exit_as_other_user([&] { return rows_of(file) == 2; }), testing::ExitedWithCode(3),
               "permission denied. Only its owner can read");
+}
+
+TEST_F(ReadOnlyFolderTest, AServerNamesTheFolder) {
+  for (const std::string& file : {file_in("alone"), folder_.file("alone/new.db")}) {
+    EXPECT_EXIT(exit_as_other_user([&] { return Store(file).is_new(); }),
+                testing::ExitedWithCode(3), "the folder .*alone is read-only for this user");
+  }
+}
+
+TEST_F(StoreFixture, ACompletedCopyIsSyncedWithItsFolder) {
+  commit({study_of(3)});
+  for (const char* name : {"copies/first.db", "copies/second.db"}) {
+    const std::string copy = folder_.file(name);
+    const std::string folder = fs::path(copy).parent_path().string();
+    fs::create_directory(folder);
+    synced_folders().clear();
+    name == std::string("copies/first.db") ? static_cast<void>(back_up(path_, copy))
+                                           : static_cast<void>(salvage(path_, copy));
+    EXPECT_THAT(synced_folders(), testing::Contains(folder)) << name;
+  }
 }
 
 TEST(FileSystemOf, AMissingPathHasTheFileSystemOfItsParent) {

@@ -10,6 +10,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -33,6 +34,7 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 
 constexpr std::int64_t kPageBytes = 8192;
@@ -161,6 +163,76 @@ TEST_F(SalvageTest, DamagedResultsAreSkippedButStudiesAndModelsWithADamagedValue
   EXPECT_THAT(faults(copy_), IsEmpty());
 }
 
+TEST_F(SalvageTest, AStudyWhoseRecipeModelOrWorkerIsDamagedIsKeptUnderAnotherNameAndPaused) {
+  const auto other =
+      table(protocol::recipe_of({{protocol::listed("k", {3e7}), protocol::listed("H", {1.0}),
+                                  protocol::listed("mu", {0.5}), protocol::listed("e", {1.0})}}));
+  commit({study_of(other, 2, "b"), worker(2), solved(study_of(other, 2), {0}, 2)});
+  close();
+  const std::string sound = folder_.file("sound.db");
+  std::filesystem::copy_file(path_, sound);
+  for (const char* damage : {"UPDATE studies SET recipe = CAST(substr(recipe, 1, 3) || x'01' AS "
+                             "BLOB) WHERE study_id = 2",
+                             "UPDATE models SET E = E + 1 WHERE model_id = 2",
+                             "UPDATE workers SET solver_version = '0.3' WHERE worker_id = 2"}) {
+    execute_sql(damage);
+    EXPECT_THAT(faults(), Not(IsEmpty())) << damage;
+    EXPECT_THAT(salvage(path_, copy_).losses,
+                ElementsAre(HasSubstr("study 2, b: its recipe, a model or a worker was changed")))
+        << damage;
+    EXPECT_THAT(rows(copy_, "SELECT name || ' ' || state FROM studies"),
+                ElementsAre("a running", testing::StartsWith("damaged study 2 ")));
+    EXPECT_EQ(rows_of(copy_), rows_of(path_)) << damage;
+    std::filesystem::remove(copy_);
+    std::filesystem::copy_file(sound, path_, std::filesystem::copy_options::overwrite_existing);
+  }
+}
+
+TEST_F(SalvageTest, DamagedDefinitionsCostNoRowAndMixUpNoColumn) {
+  close();
+  const std::string sound = folder_.file("sound.db");
+  std::filesystem::copy_file(path_, sound);
+  const std::string values = "SELECT major_peak_3_N || slide_m || closure FROM results";
+  const auto expected = rows(values);
+  for (const auto& [name, from, to] :
+       {std::tuple{"results", "major_peak_3_N", "major_peak_3_M"},  // another name
+        {"results", "slide_m REAL", "slide_n REAL"},
+        {"results", "wall_s REAL", "wall_s REAM"},
+        {"results", "CREATE TABLE", "CREATE TABLG"},
+        {"results", "TABLE results", "TABLE resultr"},
+        {"studies", "name  ", "nime  "},
+        {"runs", "SELECT", "SELEBT"},
+        {"failed_points", "WHERE", "WHESE"},
+        {"row_deleted", "UPDATE", "UPDATD"}}) {
+    execute_sql(
+        fmt::format("PRAGMA writable_schema = ON; UPDATE sqlite_schema SET"
+                    " sql = replace(sql, '{1}', '{2}') WHERE name = '{0}'",
+                    name, from, to));
+    const Salvaged saved = salvage(path_, copy_);
+    EXPECT_EQ(saved.results, 5U) << to;
+    EXPECT_THAT(saved.losses, IsEmpty()) << to;
+    EXPECT_EQ(rows(copy_, values), expected) << to;
+    EXPECT_EQ(rows(copy_, "SELECT name FROM studies").at(0), "a") << to;
+    EXPECT_THAT(faults(copy_), IsEmpty()) << to;
+    std::filesystem::remove(copy_);
+    std::filesystem::copy_file(sound, path_, std::filesystem::copy_options::overwrite_existing);
+  }
+}
+
+TEST_F(MaintenanceTest, ACopyOfDamagedContentsIsMadeAndItsFaultsAreReturned) {
+  EXPECT_THAT(back_up(path_, copy_), IsEmpty());
+  close();
+  execute_sql("UPDATE results SET mu = mu + 0.1 WHERE point = 2; UPDATE workers SET threads = 7");
+  const auto expected = faults();
+  ASSERT_THAT(expected, SizeIs(2));
+  EXPECT_EQ(back_up(path_, folder_.file("second.db")), expected);
+  execute_sql(
+      "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET"
+      " sql = replace(sql, 'm.E AS', 'm.A AS') WHERE name = 'runs'");
+  EXPECT_THROW(back_up(path_, folder_.file("third.db")), StorageError);
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("third.db")));
+}
+
 TEST_F(SalvageTest, ASoundDatabaseIsSalvagedCompletelyAndNotChanged) {
   const std::string crashed = folder_.file("crashed.db");
   std::filesystem::copy_file(path_, crashed);
@@ -179,7 +251,10 @@ TEST_F(SalvageTest, ATableThatLostAColumnIsSavedWithoutItUnlessItsRowsNeedTheCol
   execute_sql(
       "ALTER TABLE studies DROP COLUMN reuses; DROP VIEW runs;"
       "ALTER TABLE results DROP COLUMN margin");
-  EXPECT_EQ(salvage(path_, copy_).results, 5U);
+  const auto without_columns = salvage(path_, copy_);
+  EXPECT_EQ(without_columns.results, 5U);
+  EXPECT_THAT(without_columns.losses, ElementsAre("the table results has lost the columns margin",
+                                                  "the table studies has lost the columns reuses"));
   EXPECT_THAT(faults(copy_), IsEmpty());
   std::filesystem::remove(copy_);
   execute_sql("ALTER TABLE results DROP COLUMN slide_m");

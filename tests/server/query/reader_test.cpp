@@ -1,8 +1,10 @@
 #include "server/query/reader.h"
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -108,6 +110,26 @@ TEST_F(ReaderTest, StatementsMayListTablesAndUseJson) {
             protocol::Row{std::int64_t{6}});
   EXPECT_EQ(row_of("SELECT sum(atom) FROM json_tree('[1, [2, 3]]')"),
             protocol::Row{std::int64_t{6}});
+}
+
+TEST_F(ReaderTest, AFileWhoseViewOrIndexWasChangedIsRefusedByName) {
+  close();
+  const std::string sound = folder_.file("sound.db");
+  std::filesystem::copy_file(path_, sound);
+  for (const auto& [name, from, to] : {std::tuple{"runs", "m.E AS E_Pa", "m.A AS E_Pa"},
+                                       {"peaks", "->> 1", "->> 2"},
+                                       {"failed_points", "IS NOT NULL", "IS NULL"},
+                                       {"studies", "counted ", "counteD "}}) {
+    execute_sql(
+        fmt::format("PRAGMA writable_schema = ON; UPDATE sqlite_schema SET"
+                    " sql = replace(sql, '{1}', '{2}') WHERE name = '{0}'",
+                    name, from, to));
+    EXPECT_THAT([&] { Reader reader(path_); },
+                testing::ThrowsMessage<StorageError>(
+                    testing::AllOf(HasSubstr(path_), HasSubstr(name), HasSubstr("was changed"))));
+    std::filesystem::copy_file(sound, path_, std::filesystem::copy_options::overwrite_existing);
+  }
+  EXPECT_EQ(refusal_of("SELECT 1"), "it ran");
 }
 
 TEST_F(ReaderTest, ARowOrAValueOverItsLimitIsAnError) {

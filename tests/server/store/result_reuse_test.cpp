@@ -111,6 +111,59 @@ TEST_F(SamePointsTest, OnlyUnchangedRowsOfTheSolverVersionAreCopiedAndNoneOfOrTo
   }
 }
 
+/// Changes rows of `results` while SQLite does not know the index `solved_points`, which therefore
+/// keeps the old values, as after a flipped bit in a row.
+class ChangedRowTest : public SamePointsTest {
+ protected:
+  void change_rows_only(const std::string& sql) {
+    close();
+    const std::string index = " FROM sqlite_schema WHERE name = 'solved_points'";
+    execute_sql("CREATE TABLE kept AS SELECT *" + index + "; PRAGMA writable_schema = ON; DELETE" +
+                index);
+    execute_sql(sql);
+    execute_sql(
+        "PRAGMA writable_schema = ON; INSERT INTO sqlite_schema SELECT * FROM kept;"
+        "DROP TABLE kept");
+  }
+};
+
+TEST_F(ChangedRowTest, ARowWithADamagedInputIsNotCopiedAlthoughItsIndexIsRight) {
+  commit({study_of(3, 7, "for a second model")});
+  IntervalSet expected(0, 10);
+  std::uint64_t point = 0;
+  for (const char* change : {"H = 0.5", "mu = mu + 1", "e = 0.25", "model_id = 2"}) {
+    change_rows_only(
+        fmt::format("UPDATE results SET {} WHERE study_id = 1 AND point = {}", change, point));
+    expected.erase(point, point + 1);
+    ++point;
+  }
+  EXPECT_EQ(reused(), expected);
+}
+
+TEST_F(ChangedRowTest, ASoundRowIsNotCopiedForInputsThatOnlyItsDamagedIndexHas) {
+  change_rows_only(
+      fmt::format("UPDATE results SET mu = 0.77 WHERE study_id = 1 AND point = 3;"
+                  "UPDATE results SET checksum = {} WHERE study_id = 1 AND point = 3",
+                  result_checksum_sql()));
+  IntervalSet expected(0, 10);
+  expected.erase(3, 4);
+  EXPECT_EQ(reused(), expected);
+}
+
+TEST_F(SamePointsTest, RowsOfADamagedWorkerAreNotCopiedAndADamagedModelEndsTheServer) {
+  execute_sql("UPDATE workers SET threads = threads + 1 WHERE worker_id = 1");
+  EXPECT_EQ(reused(), IntervalSet());
+  execute_sql("UPDATE models SET k = k + 1");
+  EXPECT_THAT([&] { reused(); },
+              testing::ThrowsMessage<StorageGone>(testing::AllOf(
+                  testing::HasSubstr("model 1 was changed"), testing::HasSubstr("--salvage"))));
+  close();
+  EXPECT_THROW(solve(1, table_of(11)), StorageGone);
+  close();
+  execute_sql("UPDATE models SET checksum = NULL");
+  EXPECT_EQ(reused(), IntervalSet());
+}
+
 TEST_F(SamePointsTest, PointsCompletedWithoutARowGetNoCopiedRow) {
   execute_sql("INSERT INTO completed_ranges VALUES (2, 2, 3)");
   IntervalSet others(0, 10);

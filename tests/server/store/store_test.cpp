@@ -403,6 +403,46 @@ TEST_F(SchemaTest, EachStartRestoresDroppedObjectsAndKeepsOtherViews) {
   EXPECT_THAT(rows("SELECT count(*) FROM large"), ElementsAre("3"));
 }
 
+TEST_F(SchemaTest, AStartRestoresDefinitionsThatWereChangedAndRefusesChangedTables) {
+  const auto before = objects();
+  const auto rewrite = [&](const std::string& name, const std::string& from,
+                           const std::string& to) {
+    execute_sql(
+        fmt::format("PRAGMA writable_schema = ON;"
+                    "UPDATE sqlite_schema SET sql = replace(sql, '{1}', '{2}') WHERE name = '{0}'",
+                    name, from, to));
+  };
+  rewrite("runs", "m.E AS E_Pa", "m.A AS E_Pa");
+  rewrite("failed_points", "IS NOT NULL", "IS NULL");
+  rewrite("row_deleted", "counted = 0", "counted = 1");
+  EXPECT_THAT(faults(), testing::Not(IsEmpty()));
+  EXPECT_EQ(refusal(), "it opened");
+  EXPECT_EQ(objects(), before);
+  EXPECT_THAT(faults(), IsEmpty());
+  rewrite("results", "wall_s REAL", "wall_s INTEGER");
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("table results"), HasSubstr("--salvage")));
+}
+
+TEST_F(SchemaTest, TextsOfResultsAreBounded) {
+  for (const char* column : {"mode", "major_mode", "margin_event", "error"}) {
+    EXPECT_THROW(execute_sql(fmt::format("UPDATE results SET {} = hex(zeroblob(500000))", column)),
+                 StorageError)
+        << column;
+  }
+}
+
+TEST_F(SchemaTest, ElementsOfOtherProgramsAreNoFaultButNamed) {
+  execute_sql(
+      "CREATE TABLE notes (text TEXT UNIQUE); CREATE INDEX by_force ON results (fn_peak_N);"
+      "CREATE VIEW large AS SELECT * FROM runs WHERE fn_peak_N > 1e3");
+  EXPECT_EQ(refusal(), "it opened");
+  const Diagnosis found = diagnose(path_);
+  EXPECT_THAT(found.faults, IsEmpty());
+  EXPECT_THAT(found.remarks, AllOf(testing::Contains(HasSubstr("the table notes is of another")),
+                                   testing::Contains(HasSubstr("the index by_force is of another")),
+                                   testing::Contains(HasSubstr("the view large is of another"))));
+}
+
 TEST_F(SchemaTest, TriggersOfTheFileDoNotRunWithTheChangesOfAServer) {
   execute_sql(
       "CREATE TRIGGER other AFTER UPDATE ON studies BEGIN SELECT RAISE(ABORT, 'it ran'); END");
@@ -415,6 +455,34 @@ TEST_F(SchemaTest, AFileWithATableNamedLikeAViewIsRefusedUnchanged) {
   execute_sql("DROP VIEW runs; CREATE TABLE runs (mine)");
   EXPECT_THAT(refusal(), AllOf(HasSubstr("runs"), HasSubstr("rename the table")));
   EXPECT_THAT(rows("SELECT type FROM sqlite_schema WHERE name = 'runs'"), ElementsAre("table"));
+}
+
+// ---- Damage -------------------------------------------------------------------------------------
+
+TEST_F(StoreTest, DamageEndsTheWriterWithTheRemedy) {
+  const auto study = study_of(1000);
+  commit({study, worker(1), solved(study, numbers(0, 1000)), DeleteStudy{1}});
+  while (store().clear_away(1000) != ClearedAway::kAll) {
+  }
+  close();
+  {
+    std::fstream file(path_, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(35).put('\x01');  // the first free page is page 1 now
+  }
+  EXPECT_THAT(faults(), testing::Contains(HasSubstr("freelist")));
+  const auto other = study_of(1000, 2, "b");
+  EXPECT_THAT(
+      [&] {
+        commit({other, worker(2), solved(other, numbers(0, 1000), 2)});
+      },
+      testing::ThrowsMessage<StorageGone>(HasSubstr("--salvage")));
+}
+
+TEST_F(StoreTest, AChangeThatContradictsTheFileIsNoReasonToWait) {
+  commit({study_of(3)});
+  EXPECT_THROW(commit({study_of(3, 2, "a")}), ChangeRefused);
+  execute_sql("CREATE UNIQUE INDEX of_another_program ON results (e)");
+  EXPECT_THROW(commit({solved(study_of(3), numbers(0, 3), 0)}), ChangeRefused);
 }
 
 // ---- Files --------------------------------------------------------------------------------------

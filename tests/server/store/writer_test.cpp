@@ -138,6 +138,15 @@ TEST_F(GroupCommitTest, ResultsWaitWhileDiskOrMemoryIsFull) {
   }
 }
 
+TEST_F(GroupCommitTest, AResultThatContradictsTheFileEndsTheWriterAndAChangeOfAClientIsRefused) {
+  storage_.on_change = [](const Change&) { throw ChangeRefused("UNIQUE constraint failed"); };
+  jobs_ = {answered(1)};
+  EXPECT_EQ(write(), (Reports{{Kind::kRefused, 1}}));
+  jobs_ = {kept(2)};
+  EXPECT_EQ(write(), (Reports{{Kind::kGone, 0}}));
+  EXPECT_TRUE(commits_.is_gone());
+}
+
 TEST_F(GroupCommitTest, ALaterChangeDoesNotOvertakeAWaitingOneOfItsStudy) {
   storage_.on_change = [](const Change& change) {
     if (!std::holds_alternative<ForgetFailures>(change)) {
