@@ -14,6 +14,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/expression.h"
 #include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/errors.h"
@@ -250,6 +251,21 @@ void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
   }
 }
 
+/// Computes the expressions::Function that is the SQL function's user data. NULL is its NaN.
+void compute(sqlite3_context* context, int count, sqlite3_value** arguments) {
+  const auto& function = *static_cast<const expressions::Function*>(sqlite3_user_data(context));
+  std::vector<double> x;
+  for (sqlite3_value* const argument : std::span(arguments, static_cast<std::size_t>(count))) {
+    const int type = sqlite3_value_type(argument);
+    if (type == SQLITE_TEXT || type == SQLITE_BLOB) {
+      const std::string error = fmt::format("{} needs numbers", function.name);
+      return sqlite3_result_error(context, error.c_str(), -1);
+    }
+    x.push_back(type == SQLITE_NULL ? std::nan("") : sqlite3_value_double(argument));
+  }
+  sqlite3_result_double(context, function.compute(x.data()));
+}
+
 constexpr std::array<SqlFunction, 15> kFunctions{{
     {"median", "median(x)", "the middle value, or the mean of the two middle ones", true, true},
     {"stddev", "stddev(x)", "standard deviation of a sample (n - 1)", true, true},
@@ -355,10 +371,12 @@ void check_sql_part(std::string_view flag, std::string_view text) {
 }
 
 void add_functions(sqlite3* database) {
-  const auto add = [&](std::string_view name, int arguments, auto function, auto step, auto last) {
+  const auto add = [&](std::string_view name, int arguments, auto function, auto step, auto last,
+                       const expressions::Function* data = nullptr) {
     constexpr int kFlags = SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS;
-    if (sqlite3_create_function_v2(database, name.data(), arguments, kFlags, nullptr, function,
-                                   step, last, nullptr) != SQLITE_OK) {
+    if (sqlite3_create_function_v2(database, std::string(name).c_str(), arguments, kFlags,
+                                   const_cast<expressions::Function*>(data), function, step, last,
+                                   nullptr) != SQLITE_OK) {
       throw StorageError(fmt::format("no function {}: {}", name, sqlite3_errmsg(database)));
     }
   };
@@ -366,6 +384,10 @@ void add_functions(sqlite3* database) {
   add("stddev", 1, nullptr, &moments_step, &stddev_final);
   add("corr", 2, nullptr, &moments_step, &corr_final);
   add(kNumberFunction, 1, &nearest_double, nullptr, nullptr);
+  for (const auto& function : expressions::functions()) {
+    add(fmt::format("{}{}", kExpressionPrefix, function.name), static_cast<int>(function.arguments),
+        &compute, nullptr, nullptr, &function);
+  }
 }
 
 std::optional<double> decimal_number(std::string_view text) {
