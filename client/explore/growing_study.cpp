@@ -156,9 +156,12 @@ protocol::Table GrowingStudy::solve(const protocol::Block& block, const std::str
     submit(is_stored ? stored_ : recipe_);
     wait(what);
   }
-  auto table = connection_->query(
-      fmt::format("SELECT {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} ORDER BY point",
-                  columns, server::sql_text(name_), first, points_ - 1));
+  protocol::Table table;
+  for (const auto& chunk : connection_->chunks(request_for({.study = name_,
+                           .where = fmt::format("point BETWEEN {} AND {}", first, points_ - 1),
+                           .select = columns}))) {
+    protocol::append_rows(chunk, table);
+  }
   if (table.rows.size() != points_ - first) {
     throw std::runtime_error(
         fmt::format("the study \"{}\" has {} of the {} points of its block {}; another command may "

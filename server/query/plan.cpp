@@ -26,6 +26,7 @@
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
+#include "server/store/schema.h"
 #include "worker/solver/model/errors.h"
 #include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"
@@ -152,15 +153,11 @@ bool is_text(const SqlToken& token) {
   return token.text.front() == '\'' || kind_of_values(token.text) == protocol::CellKind::kText;
 }
 
-/// Returns whether a number is a double here: a decimal, because SQLite 3.40 may read it as another
-/// double than the nearest; and a large number or factor, because integers beyond 2^53 have no
-/// double.
-bool is_real(SqlTokens tokens, std::size_t i) {
-  constexpr std::size_t kMaxDigits = 7;
-  return tokens[i].kind == SqlToken::Kind::kLiteral && decimal_number(tokens[i].text) &&
-         (tokens[i].text.find_first_of(".eE") != std::string_view::npos ||
-          tokens[i].text.size() > kMaxDigits || (i > 0 && tokens[i - 1].is_sign("*")) ||
-          (i + 1 < tokens.size() && tokens[i + 1].is_sign("*")));
+/// Returns whether a number is the nearest double here, as in studies. SQLite 3.40 may read another
+/// double, and keeps whole numbers beyond 2^53.
+bool is_real(const SqlToken& token) {
+  return token.kind == SqlToken::Kind::kLiteral && solver::number_of(token.text) &&
+         (token.text.find_first_of(".eE") != std::string_view::npos || token.text.size() > 7);
 }
 
 /// Returns SQL that has the meaning of a number, operator or function in expressions of studies
@@ -180,7 +177,7 @@ std::string as_in_studies(SqlTokens tokens, std::size_t i) {
   if (token.is_sign("/")) {
     return "* 1.0 /";  // an integer divided by an integer is a double
   }
-  if (is_real(tokens, i) || (token.text == "pi" && !is_next("("))) {
+  if (is_real(token) || (token.text == "pi" && !is_next("("))) {
     return fmt::format("{}('{}')", kNumberFunction,
                        token.text == "pi" ? solver::exact_number(std::numbers::pi) : token.text);
   }
@@ -411,7 +408,7 @@ std::optional<double> number_in(SqlTokens tokens) {
     tokens = tokens.subspan(1);
   }
   const bool is_literal = tokens.size() == 1 && tokens[0].kind == SqlToken::Kind::kLiteral;
-  const auto number = is_literal ? decimal_number(tokens[0].text) : std::nullopt;
+  const auto number = is_literal ? solver::number_of(tokens[0].text) : std::nullopt;
   return number && is_negative ? std::optional(-*number) : number;
 }
 
@@ -759,9 +756,13 @@ std::string no_such_study(sqlite3* database, const std::string& name) {
       protocol::did_you_mean(name, std::vector<std::string_view>(names.begin(), names.end())));
 }
 
-Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
-  const QueriedStudy study = find_study(database, question.study());
+namespace {
+
+/// Plans the query of a study. Errors call the selected columns `select_flag`.
+Plan plan_of(sqlite3* database, const QueriedStudy& study, const protocol::StudyQuery& question,
+             const char* select_flag) {
   Parts parts = parts_of(question, study.recipe);
+  parts[0].flag = select_flag;
   auto& [select, where, group, order] = parts;
   const auto tokens = sql_tokens(select.written);
   for (const Part& part : parts) {
@@ -800,6 +801,25 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
     }
   }
   return plan;
+}
+
+}  // namespace
+
+Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
+  return plan_of(database, find_study(database, question.study()), question, "--select");
+}
+
+void check_output(const char* flag, const std::string& text) {
+  if (has_aggregate(sql_tokens(text))) {
+    throw InputError(not_allowed(flag, text, "it has one value for all points, not one for each"));
+  }
+  const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
+  create_tables(database.get());
+  create_views(database.get());
+  restrict_to_reading(database.get());
+  protocol::StudyQuery question;
+  question.add_select(fmt::format("({})", text));  // `*` and several columns are invalid here
+  plan_of(database.get(), {}, question, flag);
 }
 
 }  // namespace oblique::server

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <new>
-#include <system_error>
 #include <utility>
 
 #include <strings.h>
@@ -18,6 +16,7 @@
 #include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::server {
 namespace {
@@ -244,7 +243,7 @@ void corr_final(sqlite3_context* context) {
 
 void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
   const auto* const text = reinterpret_cast<const char*>(sqlite3_value_text(arguments[0]));
-  if (const auto number = decimal_number(text == nullptr ? "" : text)) {
+  if (const auto number = solver::number_of(text == nullptr ? "" : text)) {
     sqlite3_result_double(context, *number);
   } else {
     sqlite3_result_error(context, "nearest_double needs a number as text", -1);
@@ -388,14 +387,6 @@ void add_functions(sqlite3* database) {
     add(fmt::format("{}{}", kExpressionPrefix, function.name), static_cast<int>(function.arguments),
         &compute, nullptr, nullptr, &function);
   }
-}
-
-std::optional<double> decimal_number(std::string_view text) {
-  double number = 0.0;
-  const char* const end = text.data() + text.size();
-  const auto [read, error] = std::from_chars(text.data(), end, number);
-  const bool is_decimal = text.find_first_not_of("0123456789.eE+-") == std::string_view::npos;
-  return is_decimal && error == std::errc() && read == end ? std::optional(number) : std::nullopt;
 }
 
 std::span<const SqlFunction> sql_functions() {
