@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 
@@ -215,7 +216,9 @@ class Expression::Parser {
     double value = 0.0;
     const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
     if (error != std::errc() || !std::isfinite(value)) {
-      throw InputError("it has an invalid number");
+      throw InputError(error == std::errc::result_out_of_range
+                           ? "it has an invalid number: it is too small or too large"
+                           : "it has an invalid number");
     }
     rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
     if (!rest_.empty() && (begins_name(rest_[0]) || is_digit(rest_[0]) || rest_[0] == '.')) {
@@ -230,7 +233,8 @@ class Expression::Parser {
                                         [&](const Function& f) { return f.name == name; });
     if (take('(')) {
       if (function == kFunctions.end()) {
-        const auto known = function_names();
+        std::vector<std::string_view> known;
+        std::ranges::transform(kFunctions, std::back_inserter(known), &Function::name);
         throw InputError(fmt::format("there is no function `{}`{}; the functions are {}",
                                      name.substr(0, kLongestQuoted),
                                      protocol::did_you_mean(name, known), protocol::joined(known)));
@@ -268,14 +272,6 @@ class Expression::Parser {
 
 std::span<const Function> functions() {
   return kFunctions;
-}
-
-std::vector<std::string_view> function_names() {
-  std::vector<std::string_view> names;
-  for (const Function& function : kFunctions) {
-    names.push_back(function.name);
-  }
-  return names;
 }
 
 Expression::Expression(std::string_view text, const MeaningOf& meaning_of) {

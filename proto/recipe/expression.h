@@ -22,9 +22,6 @@ struct Function {
 /// Returns the functions that an expression may call.
 std::span<const Function> functions();
 
-/// Returns the names of the functions that an expression may call.
-std::vector<std::string_view> function_names();
-
 /// An expression such as `A^2 / (4 * pi)` or `mu > 0.5 and not e == 1`, compiled to steps of a
 /// stack machine. It may contain numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not`
 /// (in any case; also && || !), brackets and functions.

@@ -190,7 +190,8 @@ class PointTable::BlockPoints : public BlockPlace {
       std::vector<std::size_t> inputs;
       const bool has_lengths =
           std::ranges::count(base.lengths_m, base.lengths_m.front()) < std::ssize(base.lengths_m) ||
-          std::ranges::any_of(sources_, [](const auto& s) { return link_of_key(s.layout.key).has_value(); });
+          std::ranges::any_of(sources_,
+                              [](const auto& s) { return link_of_key(s.layout.key).has_value(); });
       expressions::Expression expression(text, [&](std::string_view name) {
         // The columns of these keys are a text, and NULL if the lengths of links differ.
         if (key == "where" && (name == "integrator" || (name == "length" && has_lengths))) {

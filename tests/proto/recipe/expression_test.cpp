@@ -91,8 +91,8 @@ TEST(ExpressionTest, EveryFunctionTakesItsArgumentsAndNoOthers) {
   EXPECT_EQ(value_of("min(3, 2) + max(3, 2) + if(1, 2, 3)"), 7.0);
   EXPECT_EQ(value_of("abs(-2) + floor(1.5) + ceil(1.5) + round(1.5)"), 7.0);
   EXPECT_EQ(value_of("sqrt(4) + log10(1000) + log2(8) + ln(1) + log(1)"), 8.0);
-  for (const std::string_view each : function_names()) {
-    const std::string name(each);
+  for (const Function& each : functions()) {
+    const std::string name(each.name);
     EXPECT_THAT(error_for(name + "()"), HasSubstr("and has 0"));
     EXPECT_THAT(error_for(name + "(1, 2, 3, 4)"), HasSubstr("and has 4"));
     EXPECT_THAT(error_for(name), HasSubstr("brackets"));

@@ -1,4 +1,5 @@
-// Compares the expressions of studies with queries: both compute the same values from the same texts.
+// Compares the expressions of studies with queries: both compute the same values from the same
+// texts.
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -145,9 +146,8 @@ class LanguageTest : public StoreFixture {
   /// Returns the value of `text` as an expression of a study at each point.
   static std::vector<double> in_study(const std::string& text) {
     const protocol::PointTable points(recipe());
-    const expressions::Expression expression(text, [](std::string_view name) {
-      return protocol::key_number(name);
-    });
+    const expressions::Expression expression(
+        text, [](std::string_view name) { return protocol::key_number(name); });
     std::vector<double> values;
     for (std::uint64_t i = 0; i < points.size(); ++i) {
       const auto point = points.point(i);
@@ -245,12 +245,14 @@ TEST_F(LanguageTest, WhatCannotBeTheSameIsRefusedInAStudy) {
 }
 
 TEST_F(LanguageTest, TextsAreNotNumbers) {
-  EXPECT_EQ(sqlite3_step(plan(database_.get(), [] {
-                           protocol::StudyQuery question;
-                           question.set_study("a");
-                           question.add_select("log(mode)");
-                           return question;
-                         }()).statement.get()),
+  EXPECT_EQ(sqlite3_step(plan(database_.get(),
+                              [] {
+                                protocol::StudyQuery question;
+                                question.set_study("a");
+                                question.add_select("log(mode)");
+                                return question;
+                              }())
+                             .statement.get()),
             SQLITE_ERROR);
   EXPECT_THAT(sqlite3_errmsg(database_.get()), HasSubstr("log needs numbers"));
 }
