@@ -91,7 +91,7 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
   }
   const auto& key = protocol::axis_key(parts.front());
   protocol::check_ends(key, *from, *to);
-  MapAxis axis{std::string(key.name), *from, *to, grid.last()};
+  MapAxis axis{std::string(key.name), *from + 0.0, *to + 0.0, grid.last()};  // never -0
   // Doubles must have a value for each step of the lattice.
   if (!(*to - *from > grid.last() * std::ldexp(std::max(std::abs(*from), std::abs(*to)), -50))) {
     throw InputError(fmt::format("{} {}: the ends must differ by more", flag, text));
