@@ -176,7 +176,7 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
   const auto large = test::run_oblique(folder, {"map", "--x", "mu=0:1", "--y", "H=0.3:1", "--e",
                                                 "1", "--cells", "512", "--bracket", "1e-8"});
   EXPECT_EQ(large.exit_code, 2) << large.out;
-  EXPECT_THAT(large.err, HasSubstr("--cells 512 --bracket 1e-08: a map may need 19 MiB"));
+  EXPECT_THAT(large.err, HasSubstr("--cells 512 --bracket 1e-08: a map may need 20 MiB"));
   EXPECT_FALSE(std::filesystem::exists(folder.file("oblique.db")));
 }
 
