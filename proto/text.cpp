@@ -182,6 +182,18 @@ std::string unknown_key(std::string_view name, std::span<const std::string_view>
   return fmt::format("unknown key `{}`{}", excerpt(name), did_you_mean(name, known));
 }
 
+void append_csv_field(std::string& out, std::string_view text) {
+  if (text.find_first_of(",\"\r\n") == std::string_view::npos && !text.empty()) {
+    out += text;
+    return;
+  }
+  out += '"';
+  for (const char letter : text) {
+    out.append(letter == '"' ? 2 : 1, letter);
+  }
+  out += '"';
+}
+
 std::string joined(std::span<const std::string_view> names) {
   return fmt::format("{}", fmt::join(names, ", "));
 }

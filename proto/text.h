@@ -50,6 +50,9 @@ std::string did_you_mean(std::string_view word, std::span<const std::string_view
 /// Returns a message such as "unknown key `muu` (did you mean `mu`?)".
 std::string unknown_key(std::string_view name, std::span<const std::string_view> known);
 
+/// Appends a field of CSV. Quotes it if necessary (RFC 4180) and if it is empty: `""` is not NULL.
+void append_csv_field(std::string& out, std::string_view text);
+
 std::string joined(std::span<const std::string_view> names);
 
 /// Returns 128 random bits in hexadecimal digits.

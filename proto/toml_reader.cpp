@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
 #include <sstream>
 #include <vector>
@@ -72,7 +73,21 @@ toml::table TomlReader::parse(std::string_view text) const {
   // before parsing, so it counts dots in other text too, up to a comma, '=', bracket or line end.
   std::size_t parts = 1;
   std::size_t line = 1;
-  for (const char c : text) {
+  std::size_t word = 0;  // where the current word begins
+  char quote = '\n';     // the sign that began the current text or comment; a line break: none
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '.' && c != '+' && c != '-') {
+      // toml++ reads 1e-400 as 0.
+      const auto number = text.substr(word, i - word);
+      if (const auto advice = solver::why_no_number(number); quote == '\n' && !advice.empty()) {
+        throw solver::InputError({.text = fmt::format("{} is not a number{}", number, advice),
+                                  .place = fmt::format("{}:{}", file_, line)});
+      }
+      word = i + 1;
+    }
+    const bool may_open = quote == '\n' && (c == '"' || c == '\'' || c == '#');
+    quote = may_open ? c : c == quote || c == '\n' ? '\n' : quote;
     line += c == '\n' ? 1 : 0;
     const bool is_end = std::string_view("=,[]{}\n").find(c) != std::string_view::npos;
     parts = is_end ? 1 : parts + (c == '.' ? 1 : 0);
@@ -110,7 +125,7 @@ double TomlReader::number(std::string_view key, const toml::node& node,
                            "exponent, as 1e18",
                            key, shown(node)));
   }
-  return *value;
+  return *value + 0.0;  // never -0
 }
 
 std::string TomlReader::text(std::string_view key, const toml::node& node,

@@ -24,15 +24,16 @@ constexpr const char* kQueryExamples = R"(Examples:
 `oblique columns` lists the columns, elements of lists (counted from 0) and functions. Names are
 case-sensitive: e is the coefficient of restitution, E_Pa Young's modulus. So is LIKE, as in
 "mode LIKE 'SC%'": S is stick and s slip. EXPR and COLUMNS are SQL expressions in SI units, without
-comments and parameters. Tables show some columns in other units, which the heading gives.)";
+comments and parameters. Numbers and functions are those of study files: 1/3 is 0.333..., log is
+natural, and pow(a, b) is a power. Tables show some columns in other units, which the heading gives.)";
 
 constexpr const char* kSqlExamples = R"(Examples:
   oblique sql "SELECT study, count(*), max(fn_peak_N) FROM runs GROUP BY study"
   oblique sql "SELECT * FROM peaks WHERE study_id = 1 AND major" --format csv
   oblique sql "SELECT name, sql FROM sqlite_schema"     tables and views
 
-One statement in SQLite's SQL that only reads. median(x), stddev(x) and corr(x, y) are added.
-Forms of `oblique query` that are written differently here:
+One statement in SQLite's SQL that only reads, in which 1/3 is 0 and log is decimal. median(x),
+stddev(x) and corr(x, y) are added. Forms of `oblique query` that are written differently here:
   peaks[0].fn_N           peaks ->> '$[0][1]', or the views peaks, phases, stick_intervals and
                           reaction_peaks
   count_mode('SC SR')     count(*) FILTER (WHERE major_mode = 'SC SR'))";

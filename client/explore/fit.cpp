@@ -72,9 +72,9 @@ void FitProblem::check() const {
   for (const auto& [name, from, to, start] : unknowns) {
     if (!(from < start && start < to)) {
       throw InputError(name,
-                       fmt::format("{} to {} with the start {}: the bounds must rise, and the "
-                                   "start must be between them",
-                                   solver::exact_number(from), solver::exact_number(to),
+                       fmt::format("{} from {} to {} with the start {}: the bounds must rise, "
+                                   "and the start must be between them",
+                                   name, solver::exact_number(from), solver::exact_number(to),
                                    solver::exact_number(start)));
     }
   }

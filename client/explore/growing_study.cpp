@@ -195,17 +195,23 @@ protocol::Table GrowingStudy::solve(const protocol::Block& block, const std::str
   }
   *recipe_.add_blocks() = is_stored ? stored_.blocks(round) : block;
   const std::uint64_t first = std::exchange(points_, points_ + protocol::points_of_block(block));
-  const auto statement =
-      fmt::format("SELECT {} FROM runs WHERE study = {} AND point BETWEEN {} AND {} ORDER BY point",
-                  columns, server::sql_text(name_), first, points_ - 1);
+  const auto results = [&] {
+    protocol::Table table;
+    for (const auto& chunk : connection_->chunks(request_for({.study = name_,
+                             .where = fmt::format("point BETWEEN {} AND {}", first, points_ - 1),
+                             .select = columns}))) {
+      protocol::append_rows(chunk, table);
+    }
+    return table;
+  };
   if (!is_stored || !is_submitted_) {
     submit();
     wait(what);
   }
-  auto table = connection_->query(statement);
+  auto table = results();
   if (table.rows.size() != points_ - first) {
     wait(what);  // another client has added the block, and has not all of its results
-    table = connection_->query(statement);
+    table = results();
   }
   if (table.rows.size() != points_ - first) {
     throw std::runtime_error(

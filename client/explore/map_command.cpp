@@ -92,7 +92,7 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
   }
   const auto& key = protocol::axis_key(parts.front());
   protocol::check_ends(key, *from, *to);
-  MapAxis axis{std::string(key.name), *from, *to, grid.last()};
+  MapAxis axis{std::string(key.name), *from + 0.0, *to + 0.0, grid.last()};  // never -0
   // Doubles must have a value for each step of the lattice.
   if (!(*to - *from > grid.last() * std::ldexp(std::max(std::abs(*from), std::abs(*to)), -50))) {
     throw InputError(fmt::format("{} {}: the ends must differ by more", flag, text));
@@ -104,13 +104,17 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
 /// Returns SQL over the view `runs` for the region of a point, as --of defines it: the value of a
 /// text column, or the side of the level on which a number lies. Throws InputError.
 std::string sql_of_region(const std::string& of) {
-  const auto equals = of.rfind('=');
+  auto equals = of.rfind('=');
+  if (equals != std::string::npos && of.find_last_of("<>=!", equals - 1) + 1 == equals) {
+    equals = std::string::npos;  // a comparison, such as >=
+  }
   const auto outputs = outputs_of_flag(of.substr(0, equals), true);
   const auto level =
       equals == std::string::npos ? std::nullopt : solver::number_of(of.substr(equals + 1));
   const auto& output = outputs.front();
   const bool is_text = server::kind_of_values(output) == protocol::CellKind::kText;
-  if (outputs.size() != 1 || level.has_value() == is_text || !std::isfinite(level.value_or(0.0))) {
+  if (outputs.size() != 1 || level.has_value() == is_text ||
+      (equals != std::string::npos) == is_text || !std::isfinite(level.value_or(0.0))) {
     throw InputError(
         fmt::format("--of {}: write mode, major_mode, or COLUMN=LEVEL, as stick_total_s=0", of));
   }
@@ -596,6 +600,17 @@ void check_map_flags(const MapFlags& flags) {
     throw InputError(fmt::format(
         "--bracket {} is not allowed: it must be from {} to 1/{}, a cell's part of an axis",
         flags.bracket, kLeastBracket, flags.cells));
+  }
+  // Each row of cells has up to 16 borders. A border takes about 16 points inside its cell and 6
+  // brackets that are halved. A point takes 16 bytes.
+  const double cells = flags.cells;
+  const double halvings = MapGrid::of(flags.cells, flags.bracket).halvings;
+  const double points = std::pow(cells + 1.0, 2) + 16.0 * cells * (16.0 + 6.0 * halvings);
+  if (16.0 * points > static_cast<double>(protocol::kMaxRecipeBytes)) {
+    throw InputError(
+        fmt::format("--cells {} --bracket {}: a map may need {:.0f} MiB, and a study "
+                    "can have 16 MiB: give fewer cells or a wider bracket",
+                    flags.cells, flags.bracket, 16.0 * points / 0x1p20));
   }
   check(flags.answer);
 }

@@ -1,7 +1,6 @@
 #include "client/explore/outputs.h"
 
-#include <algorithm>
-#include <cctype>
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <variant>
@@ -11,6 +10,7 @@
 #include "client/explore/estimate.h"
 #include "proto/text.h"
 #include "server/query/columns.h"
+#include "server/query/plan.h"
 #include "server/query/sql_text.h"
 #include "worker/solver/model/errors.h"
 
@@ -40,15 +40,14 @@ void check_column(std::string_view flag, std::string_view name, bool allows_text
 }  // namespace
 
 std::vector<std::string> outputs_of_flag(std::string_view text, bool allows_texts,
-                                         std::string_view flag) {
+                                         const char* flag) {
   std::vector<std::string> outputs;
-  for (std::string_view part : protocol::split(text, ',')) {
-    part.remove_prefix(std::min(part.find_first_not_of(' '), part.size()));
-    const bool is_name = std::all_of(part.begin(), part.end(), [](unsigned char letter) {
-      return std::isalnum(letter) != 0 || letter == '_';
-    });
-    is_name ? check_column(flag, part, allows_texts) : server::check_sql_part(flag, part);
-    outputs.emplace_back(part);
+  server::check_sql_part(flag, text);
+  const auto tokens = server::sql_tokens(text);
+  for (const auto part : server::sql_items(tokens)) {
+    outputs.emplace_back(server::text_over(part));
+    part.size() < 2 ? check_column(flag, outputs.back(), allows_texts)
+                    : server::check_output(flag, outputs.back());
   }
   return outputs;
 }
@@ -58,7 +57,7 @@ double number_in(const protocol::Value& value) {
     return static_cast<double>(*whole);
   }
   const auto* real = std::get_if<double>(&value);
-  return real == nullptr ? kNaN : *real;
+  return real == nullptr || std::isinf(*real) ? kNaN : *real;
 }
 
 std::string first_failure(Source& source, const std::string& study) {

@@ -16,12 +16,12 @@ inline constexpr const char* kOutputsHelp =
 
 /// Returns the outputs that the text of --of lists, as SQL over the columns of the view `runs`.
 /// Throws solver::InputError, which names `flag`, for an unknown column (with the nearest known
-/// one), for text that cannot be part of a statement and, without `allows_texts`, for a column of
+/// one), for an expression that a query would refuse and, without `allows_texts`, for a column of
 /// texts.
 std::vector<std::string> outputs_of_flag(std::string_view text, bool allows_texts,
-                                         std::string_view flag = "--of");
+                                         const char* flag = "--of");
 
-/// Returns the value as a number; NaN for NULL and for text.
+/// Returns the value as a number; NaN for NULL, infinity and text.
 double number_in(const protocol::Value& value);
 
 /// Returns " Point 7 failed: " with the error of the first failed point; empty if none failed.

@@ -188,7 +188,4 @@ void print_out(const protocol::Table& rows, Format format);
 void append_number(std::string& out, double value);
 void append_number(std::string& out, std::int64_t value);
 
-/// Appends a field of CSV. Quotes it if necessary (RFC 4180) and if it is empty: `""` is not NULL.
-void append_csv_field(std::string& out, std::string_view text);
-
 }  // namespace oblique::client

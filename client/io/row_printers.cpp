@@ -35,17 +35,18 @@ class CsvPrinter : public RowPrinter {
     if (!std::exchange(has_header_, true)) {
       for (int i = 0; i < chunk.columns_size(); ++i) {
         out += i > 0 ? "," : "";
-        append_csv_field(out, chunk.columns(i));
+        protocol::append_csv_field(out, chunk.columns(i));
       }
       out += '\n';
     }
     protocol::ChunkRows rows(chunk);
     while (rows.next()) {
+      const std::size_t before = out.size();
       for (std::size_t i = 0; i < rows.columns(); ++i) {
         out.append(i > 0 ? 1 : 0, ',');
         append_cell(out, rows.cell(i));
       }
-      out += '\n';
+      out += out.size() == before ? "\"\"\n" : "\n";  // readers skip empty lines
     }
   }
   void end(std::string&) override {}
@@ -57,7 +58,7 @@ class CsvPrinter : public RowPrinter {
     } else if (cell.kind == CellKind::kReal) {
       append_number(out, cell.real);
     } else if (cell.kind == CellKind::kText) {
-      append_csv_field(out, cell.text);
+      protocol::append_csv_field(out, cell.text);
     }
   }
 
@@ -505,18 +506,6 @@ void append_number(std::string& out, double value) {
 void append_number(std::string& out, std::int64_t value) {
   std::array<char, 24> text;
   out.append(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
-}
-
-void append_csv_field(std::string& out, std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos && !text.empty()) {
-    out += text;
-    return;
-  }
-  out += '"';
-  for (const char letter : text) {
-    out.append(letter == '"' ? 2 : 1, letter);
-  }
-  out += '"';
 }
 
 std::unique_ptr<RowPrinter> make_printer(const OutputSettings& settings) {

@@ -201,13 +201,6 @@ void fix(Condition& condition, const StudyAxis& axis, double value) {
       shown_value(axis_of(axis.label(), server::unit_of_column(axis.column)), value));
 }
 
-std::string without_spaces(std::string_view text) {
-  const auto from = text.find_first_not_of(' ');
-  return from == std::string_view::npos
-             ? std::string()
-             : std::string(text.substr(from, text.find_last_not_of(' ') + 1 - from));
-}
-
 /// Chooses lines instead of a map if only two axes vary and are not fixed (`open`), and one of them
 /// has few values: cells of a map would extend over values that the study does not have. Returns
 /// the axis along which the lines run, or nullptr if a map is better.
@@ -412,13 +405,14 @@ std::optional<Range> range_given(const PlotRequest& request) {
 }
 
 std::pair<std::string, std::string> scatter_columns(const PlotRequest& request) {
-  const std::string_view text = request.scatter;
-  const auto comma = text.find(',');
-  if (comma == std::string_view::npos || text.find(',', comma + 1) != std::string_view::npos) {
-    throw InputError(fmt::format(
-        "--scatter {} is not allowed: it must be two columns, such as mu,fn_peak_N", text));
+  const auto tokens = server::sql_tokens(request.scatter);
+  const auto items = server::sql_items(tokens);
+  if (items.size() != 2) {
+    throw InputError(
+        fmt::format("--scatter {} is not allowed: it must be two columns, such as mu,fn_peak_N",
+                    request.scatter));
   }
-  return {without_spaces(text.substr(0, comma)), without_spaces(text.substr(comma + 1))};
+  return {std::string(server::text_over(items[0])), std::string(server::text_over(items[1]))};
 }
 
 PlotRequest completed(PlotRequest request, const StudyShape& shape) {

@@ -29,11 +29,11 @@ std::string trimmed(std::string_view text) {
 double parsed_number(std::string_view field) {
   const auto value = solver::number_of(field.starts_with('+') ? field.substr(1) : field);
   if (!value) {
-    throw InputError(field.empty()
-                         ? "the field is empty: it must be a number"
-                         : fmt::format("\"{}\" is not a number", protocol::excerpt(field)));
+    throw InputError(field.empty() ? "the field is empty: it must be a number"
+                                   : fmt::format("{:?} is not a number{}", field.substr(0, 80),
+                                                 solver::why_no_number(field)));
   }
-  return *value;
+  return *value + 0.0;  // never -0
 }
 
 double number_of_field(std::string_view field, const solver::ParameterKey& key) {
@@ -121,8 +121,10 @@ void CsvFile::read_rows(std::string_view text) {
 void CsvFile::check_names() const {
   const std::size_t line = rows_.front().line;
   const auto& names = columns();
-  if (names.size() == 1 && names.front().find(';') != std::string::npos) {
-    fail(line, "columns are separated by semicolons: use commas");
+  const auto other = names.front().find_first_of(";\t");
+  if (names.size() == 1 && other != std::string::npos) {
+    fail(line, fmt::format("columns are separated by {}: use commas",
+                           names.front()[other] == ';' ? "semicolons" : "tabs"));
   }
   if (std::all_of(names.begin(), names.end(),
                   [](const auto& name) { return solver::number_of(name).has_value(); })) {

@@ -26,21 +26,31 @@ using protocol::BlockKind;
 using solver::InputError;
 using solver::ParameterKey;
 
-/// Parses a number in the text of a flag.
+/// Returns the parts of a text without the spaces before them.
+std::vector<std::string_view> parts_of(std::string_view text, char separator) {
+  auto parts = protocol::split(text, separator);
+  for (auto& part : parts) {
+    part.remove_prefix(std::min(part.find_first_not_of(' '), part.size()));
+  }
+  return parts;
+}
+
+/// Parses a number in the text of a flag. It is never -0.
 double flag_number(std::string_view part) {
   const auto value = solver::number_of(part);
   if (!value) {
     throw InputError(
-        (part.empty() ? "a value is missing" : fmt::format("\"{}\" is not a number", part)) +
+        (part.empty() ? "a value is missing"
+                      : fmt::format("{:?} is not a number{}", part, solver::why_no_number(part))) +
         "; write one value (0.4), a list (0.4,0.6,0.8), a range from:to:count (0.1:2.0:40), "
         "@FILE.csv:COLUMN, normal(MEAN,SD) in a sample, or an expression (A^2/(4*pi))");
   }
-  return *value;
+  return *value + 0.0;
 }
 
 std::vector<double> flag_numbers(std::string_view text) {
   std::vector<double> values;
-  for (const auto part : protocol::split(text, ',')) {
+  for (const auto part : parts_of(text, ',')) {
     values.push_back(flag_number(part));
   }
   return values;
@@ -56,7 +66,7 @@ std::optional<std::int64_t> whole_number(std::string_view part) {
 /// Parses from:to:count, from:to:count:log or from:to:step=STEP; in a sample also from:to.
 protocol::Axis range_of_flag(const ParameterKey& key, std::string_view text, BlockKind kind) {
   constexpr std::string_view kStep = "step=";
-  const auto parts = protocol::split(text, ':');
+  const auto parts = parts_of(text, ':');
   if (kind == BlockKind::kSample && parts.size() == 2) {
     protocol::Distribution uniform;
     uniform.set_from(flag_number(parts[0]));
@@ -106,7 +116,7 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
   const auto bracket = text.find('(');
   protocol::Distribution written;
   written.set_kind(protocol::distribution_named(text.substr(0, bracket)));
-  auto parts = protocol::split(text.substr(bracket + 1, text.size() - bracket - 2), ',');
+  auto parts = parts_of(text.substr(bracket + 1, text.size() - bracket - 2), ',');
   const bool is_normal = written.kind() == protocol::DISTRIBUTION_NORMAL;
   if (is_normal ? parts.size() < 2 || parts.size() > 4 : parts.size() != 2) {
     throw InputError(is_normal ? "write normal(MEAN,SD), or normal(MEAN,SD,FROM,TO) to truncate it"
@@ -131,22 +141,22 @@ protocol::Distribution distribution_of_flag(std::string_view text) {
 /// anything except the name of a function.
 bool is_distribution(std::string_view text, BlockKind kind) {
   const std::string_view name = text.substr(0, std::min(text.find('('), text.size()));
-  const auto functions = expressions::function_names();
+  const auto functions = expressions::functions();
   const auto distributions = protocol::distribution_names();
-  const auto is_in = [name](const auto& names) {
-    return std::find(names.begin(), names.end(), name) != names.end();
-  };
+  const bool is_function = std::ranges::count(functions, name, &expressions::Function::name) > 0;
   const bool is_call = name.size() < text.size() && text.ends_with(')') && !name.empty() &&
                        name.find_first_of("+*/^)<>=!&| ") == std::string_view::npos;
-  return is_call && (is_in(distributions) || (kind == BlockKind::kSample && !is_in(functions)));
+  return is_call && (std::ranges::count(distributions, name) > 0 ||
+                     (kind == BlockKind::kSample && !is_function));
 }
 
 /// Whether a text contains an operation or another key, and is not a list of numbers.
 bool is_expression(std::string_view text) {
-  const auto parts = protocol::split(text, ',');
+  const auto parts = parts_of(text, ',');
   return !std::all_of(parts.begin(), parts.end(),
                       [](std::string_view part) {
-                        return part.empty() || solver::number_of(part).has_value();
+                        return part.empty() || solver::number_of(part).has_value() ||
+                               !solver::why_no_number(part).empty();
                       }) &&
          (text.find_first_of("+-*/^()<>=!&|?") != std::string_view::npos ||
           protocol::is_axis_key(text));
@@ -154,7 +164,7 @@ bool is_expression(std::string_view text) {
 
 std::vector<double> integrators(std::string_view text) {
   std::vector<double> values;
-  for (const auto name : protocol::split(text, ',')) {
+  for (const auto name : parts_of(text, ',')) {
     values.push_back(static_cast<double>(solver::integrator_named(name)));
   }
   return values;
@@ -162,7 +172,7 @@ std::vector<double> integrators(std::string_view text) {
 
 /// Parses kind:count:seed, or kind:count.
 protocol::Sample sample_of_flag(std::string_view text) {
-  const auto parts = protocol::split(text, ':');
+  const auto parts = parts_of(text, ':');
   const auto count = parts.size() > 1 ? whole_number(parts[1]) : std::nullopt;
   const auto seed = parts.size() > 2 ? whole_number(parts[2]) : protocol::kUsualSeed;
   if (parts.size() > 3 || !count || !seed) {
@@ -187,7 +197,7 @@ BlockKind kind_of_block(const PointFlags& flags) {
 
 std::vector<double> lengths_of_flag(std::string_view text) {
   std::vector<double> lengths;
-  for (const auto part : protocol::split(text, ',')) {
+  for (const auto part : parts_of(text, ',')) {
     const auto length = solver::number_of(part);
     if (!length) {
       throw InputError(

@@ -171,11 +171,12 @@ class AxisTable {
       return protocol::stepped_axis(key_, from, to, *value("step"));
     }
     const auto& count = *table_.get("count");
-    if (!count.is_integer()) {
+    const auto whole = count.value<std::int64_t>();  // also of 3.0
+    if (!whole || !count.is_number()) {
       protocol::throw_wrong_count(key_, protocol::shown(count));
     }
     return protocol::counted_axis(
-        key_, from, to, *count.value<std::int64_t>(),
+        key_, from, to, *whole,
         spacing == "log" ? protocol::SPACING_LOGARITHMIC : protocol::SPACING_LINEAR);
   }
 
@@ -434,8 +435,8 @@ Study read_study_file(const std::filesystem::path& path, const ReachCheck& check
                                      ? fmt::format(" (did you mean `{}`?)", with_ending.string())
                                      : ""));
   }
-  // A recipe has at most 4 MiB. A number takes 8 bytes in a recipe and up to 25 bytes in a file.
-  constexpr std::size_t kMaxBytes = std::size_t{16} << 20U;
+  // A number takes 8 bytes in a recipe and up to 27 bytes in a file.
+  constexpr std::size_t kMaxBytes = 4 * protocol::kMaxRecipeBytes;
   return parse_study(protocol::read_small_file(path.string(), "the study file", kMaxBytes),
                      path.string(), check_reach);
 }

@@ -4,7 +4,6 @@
 #include <array>
 #include <cctype>
 #include <filesystem>
-#include <regex>
 #include <span>
 #include <string_view>
 #include <system_error>
@@ -40,18 +39,26 @@ void set(CLI::Option& option, const std::vector<std::string>& values) {
   option.run_callback();
 }
 
+/// Returns the kind of an option's values in TOML, by the name of its type in the help.
+std::string kind_taken_by(const CLI::Option& option) {
+  constexpr std::array<std::string_view, 4> kNumbers{"INT", "UINT", "FLOAT", "SECONDS"};
+  const auto is_type = [&](auto type) { return option.get_type_name().starts_with(type); };
+  return option.get_items_expected_max() == 0     ? "a boolean"
+         : std::ranges::any_of(kNumbers, is_type) ? "a number"
+                                                  : "a string";
+}
+
 /// Returns the values of a key in the form in which they would be typed on the command line.
 std::vector<std::string> typed_values(const TomlReader& file, std::string_view key,
-                                      const toml::node& node) {
+                                      const toml::node& node, const CLI::Option& option) {
   std::vector<std::string> values;
   const auto take = [&](const toml::node& item) {
-    values.push_back(item.is_string()                        ? *item.value<std::string>()
-                     : item.is_number() || item.is_boolean() ? shown(item)
-                                                             : "");
-    if (values.back().empty()) {
-      file.fail(item, fmt::format("{} = {} is not allowed: it must be a number, true, false, a "
-                                  "text that is not empty, or a list of these",
-                                  excerpt(key), shown(item)));
+    const bool is_size = item.is_number() && option.get_type_name().starts_with("SIZE");
+    values.push_back(item.is_string() ? *item.value<std::string>() : shown(item));
+    if (values.back().empty() || (kind_of(item) != kind_taken_by(option) && !is_size)) {
+      file.fail(item, fmt::format("{} = {} is not allowed: it must be {}{}", excerpt(key),
+                                  shown(item), kind_taken_by(option),
+                                  values.back().empty() ? " that is not empty" : ""));
     }
   };
   if (const auto* list = node.as_array(); list != nullptr && !list->empty()) {
@@ -62,11 +69,6 @@ std::vector<std::string> typed_values(const TomlReader& file, std::string_view k
     take(node);
   }
   return values;
-}
-
-std::string toml_value(const std::string& value) {
-  static const std::regex kWithoutQuotes(R"(true|false|(0|[1-9]\d{0,17})(\.\d+)?)");
-  return std::regex_match(value, kWithoutQuotes) ? value : toml_string(value);
 }
 
 /// Returns the configuration folder of this installation: /etc/oblique for programs in /usr/bin,
@@ -185,10 +187,10 @@ void Configuration::set_from_file(std::string& place) const {
       file.fail(key,
                 fmt::format("there is no setting {}{}", excerpt(name), did_you_mean(name, known)));
     }
-    const auto values = typed_values(file, name, node);
+    CLI::Option& option = *settings_[static_cast<std::size_t>(found - known.begin())].option;
+    const auto values = typed_values(file, name, node, option);
     place = file.place(key.source()) + ": ";
-    const auto index = static_cast<std::size_t>(found - known.begin());
-    if (CLI::Option& option = *settings_[index].option; option.count() == 0) {
+    if (option.count() == 0) {
       set(option, values);
     }
   };
@@ -220,7 +222,9 @@ std::string Configuration::printed() const {
       text += fmt::format("# {} is not set\n", setting.key);
       continue;
     }
-    std::transform(values.begin(), values.end(), values.begin(), toml_value);
+    if (kind_taken_by(option) == "a string") {
+      std::transform(values.begin(), values.end(), values.begin(), toml_string);
+    }
     text += is_list ? fmt::format("{} = [{}]\n", setting.key, fmt::join(values, ", "))
                     : fmt::format("{} = {}\n", setting.key, values.back());
   }

@@ -326,6 +326,12 @@ void check_range(const ParameterKey& key, const Axis& axis) {
           "{}: count = {} is not allowed with equal ends {}: all values would be the same; give "
           "a single value",
           key.name, axis.count(), axis.from());
+  const double largest = std::max(std::abs(axis.from()), std::abs(axis.to()));
+  const double size = axis.spacing() == SPACING_LOGARITHMIC ? axis.from() : largest;
+  require(axis.count() == 1 || axis.count() > kMaxPoints ||
+              (axis.to() - axis.from()) / static_cast<double>(axis.count() - 1) > 0x1p-51 * size,
+          "{}: count = {} is not allowed from {} to {}: some of the values would be equal",
+          key.name, axis.count(), axis.from(), axis.to());
   const RangeValues values(axis);
   if (axis.spacing() == SPACING_LOGARITHMIC) {
     check_positive(key, axis.from());

@@ -4,8 +4,11 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
+
+#include <strings.h>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -17,22 +20,16 @@ namespace {
 
 using solver::InputError;
 
+constexpr double kUndefined = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kLongestQuoted = 40;
 constexpr const char* kComma = "`,` is allowed only between the arguments of a function";
 
 /// Returns NaN if x[0] or x[1] is NaN, because an undefined condition must not count as false.
 double truth(const double* x, bool value) {
-  return std::isnan(x[0]) || std::isnan(x[1]) ? std::numeric_limits<double>::quiet_NaN()
-                                              : static_cast<double>(value);
+  return std::isnan(x[0]) || std::isnan(x[1]) ? kUndefined : static_cast<double>(value);
 }
 
-struct Function {
-  std::string_view name;
-  std::size_t arguments;
-  double (*compute)(const double* x);
-};
-
-constexpr std::array<Function, 22> kFunctions{{
+constexpr std::array<Function, 23> kFunctions{{
     {"abs", 1, [](const double* x) { return std::abs(x[0]); }},
     {"sqrt", 1, [](const double* x) { return std::sqrt(x[0]); }},
     {"exp", 1, [](const double* x) { return std::exp(x[0]); }},
@@ -49,6 +46,7 @@ constexpr std::array<Function, 22> kFunctions{{
     {"sinh", 1, [](const double* x) { return std::sinh(x[0]); }},
     {"cosh", 1, [](const double* x) { return std::cosh(x[0]); }},
     {"tanh", 1, [](const double* x) { return std::tanh(x[0]); }},
+    {"pow", 2, [](const double* x) { return std::pow(x[0], x[1]); }},
     {"floor", 1, [](const double* x) { return std::floor(x[0]); }},
     {"ceil", 1, [](const double* x) { return std::ceil(x[0]); }},
     {"round", 1, [](const double* x) { return std::round(x[0]); }},
@@ -83,7 +81,7 @@ constexpr std::array<Operator, 15> kOperators{{
     {"+", kSum, [](const double* x) { return x[0] + x[1]; }},
     {"-", kSum, [](const double* x) { return x[0] - x[1]; }},
     {"*", kProduct, [](const double* x) { return x[0] * x[1]; }},
-    {"/", kProduct, [](const double* x) { return x[0] / x[1]; }},
+    {"/", kProduct, [](const double* x) { return x[1] == 0.0 ? kUndefined : x[0] / x[1]; }},
     {"^", kPower, [](const double* x) { return std::pow(x[0], x[1]); }},
 }};
 
@@ -92,6 +90,11 @@ bool is_digit(char c) {
 }
 bool begins_name(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+}
+
+/// Returns whether `word` is the operator `name`, ignoring case, as SQL does.
+bool is_word(std::string_view word, std::string_view name) {
+  return word.size() == name.size() && strncasecmp(word.data(), name.data(), name.size()) == 0;
 }
 
 std::string_view name_at(std::string_view text) {
@@ -138,7 +141,7 @@ class Expression::Parser {
     const char c = next();
     const std::string_view word = name_at(rest_);
     const auto* found = std::find_if(kOperators.begin(), kOperators.end(), [&](const auto& o) {
-      return word.empty() ? rest_.starts_with(o.sign) : word == o.sign;
+      return word.empty() ? rest_.starts_with(o.sign) : is_word(word, o.sign);
     });
     if (found != kOperators.end()) {
       return found;
@@ -177,17 +180,17 @@ class Expression::Parser {
       close();
     } else if (take('-')) {
       read_operations(kSign);
-      to_.steps_.push_back({[](const double* x) { return -*x; }, 1});
+      to_.steps_.push_back({[](const double* x) { return 0.0 - *x; }, 1});
     } else if (take('+')) {
       read_operations(kSign);
-    } else if ((c == '!' && !rest_.starts_with("!=")) || word == "not") {
+    } else if ((c == '!' && !rest_.starts_with("!=")) || is_word(word, "not")) {
       if (weakest > kNot) {
         throw InputError("`not` after an operator needs brackets");
       }
       rest_.remove_prefix(std::max<std::size_t>(word.size(), 1));
       read_operations(kNot);
       to_.steps_.push_back({[](const double* x) { return std::isnan(*x) ? *x : *x == 0.0; }, 1});
-    } else if (word.empty() || word == "and" || word == "or") {
+    } else if (word.empty() || is_word(word, "and") || is_word(word, "or")) {
       throw InputError(c == '\0' ? "a value is missing at its end"
                                  : fmt::format("a value is missing before {}", quoted_next()));
     } else {
@@ -213,7 +216,9 @@ class Expression::Parser {
     double value = 0.0;
     const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
     if (error != std::errc() || !std::isfinite(value)) {
-      throw InputError("it has an invalid number");
+      throw InputError(error == std::errc::result_out_of_range
+                           ? "it has an invalid number: it is too small or too large"
+                           : "it has an invalid number");
     }
     rest_.remove_prefix(static_cast<std::size_t>(end - rest_.data()));
     if (!rest_.empty() && (begins_name(rest_[0]) || is_digit(rest_[0]) || rest_[0] == '.')) {
@@ -228,7 +233,8 @@ class Expression::Parser {
                                         [&](const Function& f) { return f.name == name; });
     if (take('(')) {
       if (function == kFunctions.end()) {
-        const auto known = function_names();
+        std::vector<std::string_view> known;
+        std::ranges::transform(kFunctions, std::back_inserter(known), &Function::name);
         throw InputError(fmt::format("there is no function `{}`{}; the functions are {}",
                                      name.substr(0, kLongestQuoted),
                                      protocol::did_you_mean(name, known), protocol::joined(known)));
@@ -264,12 +270,8 @@ class Expression::Parser {
   const MeaningOf& meaning_of_;
 };
 
-std::vector<std::string_view> function_names() {
-  std::vector<std::string_view> names;
-  for (const Function& function : kFunctions) {
-    names.push_back(function.name);
-  }
-  return names;
+std::span<const Function> functions() {
+  return kFunctions;
 }
 
 Expression::Expression(std::string_view text, const MeaningOf& meaning_of) {
@@ -295,7 +297,7 @@ double Expression::value_at(std::span<const double> values) const {
   }
   const double value = stack.front();
   // A NaN may have a sign; this one has none.
-  return std::isnan(value) ? std::numeric_limits<double>::quiet_NaN() : value;
+  return std::isnan(value) ? kUndefined : value;
 }
 
 }  // namespace oblique::expressions

@@ -12,12 +12,19 @@ namespace oblique::expressions {
 /// Maximum length of an expression [bytes].
 inline constexpr std::size_t kLongestText = 1000;
 
-/// Returns the names of the functions that an expression may call.
-std::vector<std::string_view> function_names();
+/// A function of the language. NaN as an argument or value means undefined.
+struct Function {
+  std::string_view name;
+  std::size_t arguments;
+  double (*compute)(const double* x);
+};
+
+/// Returns the functions that an expression may call.
+std::span<const Function> functions();
 
 /// An expression such as `A^2 / (4 * pi)` or `mu > 0.5 and not e == 1`, compiled to steps of a
 /// stack machine. It may contain numbers, names, `pi`, + - * / ^, comparisons, `and` `or` `not`
-/// (also && || !), brackets and functions.
+/// (in any case; also && || !), brackets and functions.
 class Expression {
  public:
   /// `meaning_of` is called for each name, in the order of the text. It returns the index of the

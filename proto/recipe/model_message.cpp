@@ -44,9 +44,6 @@ constexpr std::array<Field, 12> kFields{{
     {&Model::tolerance, &Message::tolerance, &Message::set_tolerance},
 }};
 
-/// Maximum size of a recipe [bytes]. A frame for a worker contains the recipe and other fields.
-constexpr std::size_t kLongestRecipe = kMaxFrameBytes - 1024;
-
 std::string comparable_bytes(Block block) {
   block.DiscardUnknownFields();
   return block.SerializeAsString();
@@ -140,18 +137,18 @@ std::string recipe_digest(const Recipe& recipe) {
 
 void check_size(const Recipe& recipe) {
   const std::size_t bytes = recipe.ByteSizeLong();
-  if (bytes > kLongestRecipe) {
+  if (bytes > kMaxRecipeBytes) {
     throw InputError(fmt::format(
         "the recipe has {} bytes, and at most {} fit into a message to a worker: write long lists "
         "of "
         "values as ranges, or split long columns of a CSV file into several studies; a listed "
         "value takes 8 bytes",
-        bytes, kLongestRecipe));
+        bytes, kMaxRecipeBytes));
   }
 }
 
 bool parse_recipe(std::string_view bytes, Recipe& recipe) {
-  return bytes.size() <= kLongestRecipe && is_recipe_within_limits(bytes) &&
+  return bytes.size() <= kMaxRecipeBytes && is_recipe_within_limits(bytes) &&
          recipe.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
@@ -174,8 +171,9 @@ Axis listed_axis(const solver::ParameterKey& key, const std::vector<double>& val
 void throw_wrong_count(const solver::ParameterKey& key, std::string_view written) {
   throw InputError(
       key.name,
-      fmt::format("{}: count = {} is not allowed: count must be a whole number, at least 1",
-                  key.name, written));
+      fmt::format(
+          "{}: count = {} is not allowed: count must be a whole number without a point, at least 1",
+          key.name, written));
 }
 
 Axis counted_axis(const solver::ParameterKey& key, double from, double to, std::int64_t count,
@@ -304,13 +302,18 @@ solver::ModelParameters ModelInput::model() const {
 
 std::string study_name_error(const std::string& name) {
   constexpr std::size_t kMaxBytes = 100;
-  if (!name.empty() && name.size() <= kMaxBytes && name.front() != '-' && is_visible(name)) {
+  // Combining marks U+0300 to U+036F and the no-break space: other texts look the same.
+  const auto mark = std::ranges::adjacent_find(name, [](char a, char b) {
+    return a == '\xcc' || (a == '\xcd' && b < '\xb0') || (a == '\xc2' && b == '\xa0');
+  });
+  if (!name.empty() && name.size() <= kMaxBytes && name.front() != '-' && is_visible(name) &&
+      mark == name.end()) {
     return {};
   }
   return fmt::format(
       "name = \"{}\" is not allowed: the name of a study has 1 to {} bytes of UTF-8, no control "
-      "characters, marks of writing direction or zero-width characters, and does not begin with "
-      "'-'",
+      "characters, combining marks, no-break spaces, marks of writing direction or zero-width "
+      "characters, and does not begin with '-'",
       visible(name.substr(0, kMaxBytes)), kMaxBytes);
 }
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/frames.h"
 #include "proto/oblique.pb.h"
 #include "worker/solver/model/parameters.h"
 
@@ -35,6 +36,9 @@ bool is_same_block(const Block& a, const Block& b);
 /// Returns the SHA-256, in hexadecimal digits, of the recipe's model, blocks and request for
 /// estimated errors.
 std::string recipe_digest(const Recipe& recipe);
+
+/// Maximum size of a recipe [bytes]. A frame for a worker contains the recipe and other fields.
+inline constexpr std::size_t kMaxRecipeBytes = kMaxFrameBytes - 1024;
 
 /// Throws solver::InputError if the recipe does not fit into a frame for a worker.
 void check_size(const Recipe& recipe);

@@ -188,7 +188,15 @@ class PointTable::BlockPoints : public BlockPlace {
                        const std::string& text, std::size_t axis) {
     return in_expression(key, text, [&] {
       std::vector<std::size_t> inputs;
+      const bool has_lengths =
+          std::ranges::count(base.lengths_m, base.lengths_m.front()) < std::ssize(base.lengths_m) ||
+          std::ranges::any_of(sources_,
+                              [](const auto& s) { return link_of_key(s.layout.key).has_value(); });
       expressions::Expression expression(text, [&](std::string_view name) {
+        // The columns of these keys are a text, and NULL if the lengths of links differ.
+        if (key == "where" && (name == "integrator" || (name == "length" && has_lengths))) {
+          throw InputError(fmt::format("`{}` has no number here", name));
+        }
         const auto meaning = meaning_of(base, name);
         if (const auto* axis_of_name = std::get_if<std::size_t>(&meaning)) {
           inputs.push_back(*axis_of_name);

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string_view>
@@ -19,12 +20,15 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/expression.h"
 #include "proto/recipe/model_message.h"
 #include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "server/query/columns.h"
 #include "server/query/sql_text.h"
+#include "server/store/schema.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
 #include "worker/solver/model/result_fields.h"
 
 namespace oblique::server {
@@ -140,10 +144,54 @@ Element element_at(SqlTokens tokens) {
       4, "major_mode", fmt::format("count(*) FILTER (WHERE major_mode = {})", tokens[2].text), {}};
 }
 
-/// Returns whether SQLite 3.40 may read the number as a double that is not the nearest one.
-bool is_decimal(const SqlToken& token) {
-  return token.kind == SqlToken::Kind::kLiteral && decimal_number(token.text) &&
-         token.text.find_first_of(".eE") != std::string_view::npos;
+SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
+  const std::size_t end = std::min(closing_bracket(tokens, i + 1), tokens.size());
+  return tokens.subspan(i + 2, end - i - 2);
+}
+
+bool is_text(const SqlToken& token) {
+  return token.text.front() == '\'' || kind_of_values(token.text) == protocol::CellKind::kText;
+}
+
+/// Returns whether a number is the nearest double here, as in studies. SQLite 3.40 may read another
+/// double, and keeps whole numbers beyond 2^53.
+bool is_real(const SqlToken& token) {
+  return token.kind == SqlToken::Kind::kLiteral && solver::number_of(token.text) &&
+         (token.text.find_first_of(".eE") != std::string_view::npos || token.text.size() > 7);
+}
+
+/// Returns SQL that has the meaning of a number, operator or function in expressions of studies
+/// (proto/recipe/README.md); an empty text if SQLite gives the token this meaning.
+std::string as_in_studies(SqlTokens tokens, std::size_t i) {
+  const SqlToken& token = tokens[i];
+  const auto is_next = [&](std::string_view sign) {
+    return i + 1 < tokens.size() && tokens[i + 1].is_sign(sign);
+  };
+  if (token.is_sign("^")) {
+    throw InputError("write pow(a, b) instead of a ^ b in a query");
+  }
+  if (token.is_sign("|") && is_next("|") && i > 0 && i + 2 < tokens.size() &&
+      !is_text(tokens[i - 1]) && !is_text(tokens[i + 2])) {
+    throw InputError("write OR instead of || in a query, in which || joins texts");
+  }
+  if (token.is_sign("/")) {
+    return "* 1.0 /";  // an integer divided by an integer is a double
+  }
+  if (is_real(token) || (token.text == "pi" && !is_next("("))) {
+    return fmt::format("{}('{}')", kNumberFunction,
+                       token.text == "pi" ? solver::exact_number(std::numbers::pi) : token.text);
+  }
+  if (token.is_name() && is_next("(")) {
+    const std::string name = name_of(token);
+    const std::size_t arguments = sql_items(arguments_of(tokens, i)).size();
+    for (const auto& function : expressions::functions()) {
+      if (function.arguments == arguments &&
+          strcasecmp(name.c_str(), std::string(function.name).c_str()) == 0) {
+        return fmt::format("{}{}", kExpressionPrefix, function.name);
+      }
+    }
+  }
+  return {};
 }
 
 /// Translates `tokens` for SQLite. Adds the columns and other names in them to `names`.
@@ -152,8 +200,8 @@ std::string in_sqlite(SqlTokens tokens, Names& names) {
   const char* copied = text_over(tokens).data();
   for (std::size_t i = 0; i < tokens.size(); ++i) {
     Element element = element_at(tokens.subspan(i));
-    if (element.tokens == 0 && is_decimal(tokens[i])) {
-      element = {1, {}, fmt::format("{}('{}')", kNumberFunction, tokens[i].text), {}};
+    if (const auto sql = as_in_studies(tokens, i); element.tokens == 0 && !sql.empty()) {
+      element = {1, {}, sql, {}};
     }
     if (element.tokens > 0) {
       names.insert(element.column);
@@ -175,11 +223,6 @@ const SqlFunction* function_at(SqlTokens tokens, std::size_t i) {
   const auto found = std::ranges::find_if(
       functions, [&](const SqlFunction& each) { return is_word(tokens[i], each.name); });
   return found == functions.end() ? nullptr : &*found;
-}
-
-SqlTokens arguments_of(SqlTokens tokens, std::size_t i) {
-  const std::size_t end = std::min(closing_bracket(tokens, i + 1), tokens.size());
-  return tokens.subspan(i + 2, end - i - 2);
 }
 
 /// Returns whether an aggregate function is called at token `i`. min and max with several arguments
@@ -365,7 +408,7 @@ std::optional<double> number_in(SqlTokens tokens) {
     tokens = tokens.subspan(1);
   }
   const bool is_literal = tokens.size() == 1 && tokens[0].kind == SqlToken::Kind::kLiteral;
-  const auto number = is_literal ? decimal_number(tokens[0].text) : std::nullopt;
+  const auto number = is_literal ? solver::number_of(tokens[0].text) : std::nullopt;
   return number && is_negative ? std::optional(-*number) : number;
 }
 
@@ -713,9 +756,13 @@ std::string no_such_study(sqlite3* database, const std::string& name) {
       protocol::did_you_mean(name, std::vector<std::string_view>(names.begin(), names.end())));
 }
 
-Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
-  const QueriedStudy study = find_study(database, question.study());
+namespace {
+
+/// Plans the query of a study. Errors call the selected columns `select_flag`.
+Plan plan_of(sqlite3* database, const QueriedStudy& study, const protocol::StudyQuery& question,
+             const char* select_flag) {
   Parts parts = parts_of(question, study.recipe);
+  parts[0].flag = select_flag;
   auto& [select, where, group, order] = parts;
   const auto tokens = sql_tokens(select.written);
   for (const Part& part : parts) {
@@ -754,6 +801,25 @@ Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
     }
   }
   return plan;
+}
+
+}  // namespace
+
+Plan plan(sqlite3* database, const protocol::StudyQuery& question) {
+  return plan_of(database, find_study(database, question.study()), question, "--select");
+}
+
+void check_output(const char* flag, const std::string& text) {
+  if (has_aggregate(sql_tokens(text))) {
+    throw InputError(not_allowed(flag, text, "it has one value for all points, not one for each"));
+  }
+  const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
+  create_tables(database.get());
+  create_views(database.get());
+  restrict_to_reading(database.get());
+  protocol::StudyQuery question;
+  question.add_select(fmt::format("({})", text));  // `*` and several columns are invalid here
+  plan_of(database.get(), {}, question, flag);
 }
 
 }  // namespace oblique::server

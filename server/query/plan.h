@@ -30,6 +30,10 @@ struct Plan {
 /// Throws NoSuchStudy, and StorageError or QueryError if the database cannot be read.
 Plan plan(sqlite3* database, const protocol::StudyQuery& question);
 
+/// Throws solver::InputError, which names `flag`, unless a query can select `text` as one value of
+/// each point. `text` must have passed check_sql_part.
+void check_output(const char* flag, const std::string& text);
+
 /// Returns the error message for an unknown study, which suggests the nearest study name.
 std::string no_such_study(sqlite3* database, const std::string& name);
 

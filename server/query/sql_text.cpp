@@ -2,21 +2,21 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <new>
-#include <system_error>
 #include <utility>
 
 #include <strings.h>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/recipe/expression.h"
 #include "proto/text.h"
 #include "server/database/sqlite.h"
 #include "worker/solver/model/errors.h"
+#include "worker/solver/model/number.h"
 
 namespace oblique::server {
 namespace {
@@ -243,11 +243,26 @@ void corr_final(sqlite3_context* context) {
 
 void nearest_double(sqlite3_context* context, int, sqlite3_value** arguments) {
   const auto* const text = reinterpret_cast<const char*>(sqlite3_value_text(arguments[0]));
-  if (const auto number = decimal_number(text == nullptr ? "" : text)) {
+  if (const auto number = solver::number_of(text == nullptr ? "" : text)) {
     sqlite3_result_double(context, *number);
   } else {
     sqlite3_result_error(context, "nearest_double needs a number as text", -1);
   }
+}
+
+/// Computes the expressions::Function that is the SQL function's user data. NULL is its NaN.
+void compute(sqlite3_context* context, int count, sqlite3_value** arguments) {
+  const auto& function = *static_cast<const expressions::Function*>(sqlite3_user_data(context));
+  std::vector<double> x;
+  for (sqlite3_value* const argument : std::span(arguments, static_cast<std::size_t>(count))) {
+    const int type = sqlite3_value_type(argument);
+    if (type == SQLITE_TEXT || type == SQLITE_BLOB) {
+      const std::string error = fmt::format("{} needs numbers", function.name);
+      return sqlite3_result_error(context, error.c_str(), -1);
+    }
+    x.push_back(type == SQLITE_NULL ? std::nan("") : sqlite3_value_double(argument));
+  }
+  sqlite3_result_double(context, function.compute(x.data()));
 }
 
 constexpr std::array<SqlFunction, 15> kFunctions{{
@@ -355,10 +370,12 @@ void check_sql_part(std::string_view flag, std::string_view text) {
 }
 
 void add_functions(sqlite3* database) {
-  const auto add = [&](std::string_view name, int arguments, auto function, auto step, auto last) {
+  const auto add = [&](std::string_view name, int arguments, auto function, auto step, auto last,
+                       const expressions::Function* data = nullptr) {
     constexpr int kFlags = SQLITE_UTF8 | SQLITE_DETERMINISTIC | SQLITE_INNOCUOUS;
-    if (sqlite3_create_function_v2(database, name.data(), arguments, kFlags, nullptr, function,
-                                   step, last, nullptr) != SQLITE_OK) {
+    if (sqlite3_create_function_v2(database, std::string(name).c_str(), arguments, kFlags,
+                                   const_cast<expressions::Function*>(data), function, step, last,
+                                   nullptr) != SQLITE_OK) {
       throw StorageError(fmt::format("no function {}: {}", name, sqlite3_errmsg(database)));
     }
   };
@@ -366,14 +383,10 @@ void add_functions(sqlite3* database) {
   add("stddev", 1, nullptr, &moments_step, &stddev_final);
   add("corr", 2, nullptr, &moments_step, &corr_final);
   add(kNumberFunction, 1, &nearest_double, nullptr, nullptr);
-}
-
-std::optional<double> decimal_number(std::string_view text) {
-  double number = 0.0;
-  const char* const end = text.data() + text.size();
-  const auto [read, error] = std::from_chars(text.data(), end, number);
-  const bool is_decimal = text.find_first_not_of("0123456789.eE+-") == std::string_view::npos;
-  return is_decimal && error == std::errc() && read == end ? std::optional(number) : std::nullopt;
+  for (const auto& function : expressions::functions()) {
+    add(fmt::format("{}{}", kExpressionPrefix, function.name), static_cast<int>(function.arguments),
+        &compute, nullptr, nullptr, &function);
+  }
 }
 
 std::span<const SqlFunction> sql_functions() {

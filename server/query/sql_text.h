@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -55,11 +54,12 @@ std::string not_allowed(std::string_view flag, std::string_view text, std::strin
 /// brackets are not allowed. SQLite checks the rest.
 void check_sql_part(std::string_view flag, std::string_view text);
 
+/// Prefix of the SQL names of the functions of expressions. Queries call them instead of SQLite's
+/// functions, which have other values: SQLite's log(10) is 1.
+inline constexpr std::string_view kExpressionPrefix = "expression_";
+
 /// SQL function that returns the double nearest to the decimal in a text.
 inline constexpr std::string_view kNumberFunction = "nearest_double";
-
-/// Returns the double nearest to a decimal such as .5 or 1e-3; none for other texts.
-std::optional<double> decimal_number(std::string_view text);
 
 /// A function that queries may use: one of ours, or SQLite's.
 struct SqlFunction {
@@ -72,8 +72,9 @@ struct SqlFunction {
 };
 std::span<const SqlFunction> sql_functions();
 
-/// Adds kNumberFunction and the aggregate functions median(x), stddev(x) and corr(x, y) to
-/// `database`. They ignore NULL and refuse values that are not numbers. Throws StorageError.
+/// Adds kNumberFunction, the functions with kExpressionPrefix, and the aggregate functions
+/// median(x), stddev(x) and corr(x, y) to `database`. They ignore NULL and refuse values that are
+/// not numbers. Throws StorageError.
 void add_functions(sqlite3* database);
 
 }  // namespace oblique::server

@@ -1,5 +1,6 @@
 #include "proto/toml_reader.h"
 
+#include <cmath>
 #include <functional>
 #include <string>
 
@@ -9,6 +10,7 @@
 namespace oblique::protocol {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
 TomlReader reader() {
@@ -47,6 +49,20 @@ TEST(TomlReader, RefusesKeysThatNestDeeply) {
     numbers += ", 0.5";
   }
   EXPECT_EQ(parse_error(numbers + "]\n"), "nothing was thrown");
+}
+
+TEST(TomlReader, ANumberThatADoubleCannotHoldIsRefused) {
+  for (const char* text : {"x = 1e-400\n", "x = [1, -1e-400]\n", "x = { y = +1.5E400 }\n",
+                           "x = 1 # it's\ny = 1e-400"}) {
+    EXPECT_THAT(parse_error(text + std::string("\n")), HasSubstr("is not a number: it is too"));
+  }
+  EXPECT_EQ(parse_error("x = '1e-400' # 1e-400\ny = 1e-300\nz = \"1e-400\"\n"),
+            "nothing was thrown");
+}
+
+TEST(TomlReader, AZeroHasNoSign) {
+  const auto top = reader().parse("x = -0.0\n");
+  EXPECT_FALSE(std::signbit(reader().number("x", *top.get("x"), "a number")));
 }
 
 TEST(TomlReader, ErrorsNameTheKindOfAValueAndTheExpectedOne) {

@@ -103,9 +103,9 @@ ContactSteps StepChoice::contact(double e_star) const {
   ContactSteps steps = without_step_factor(e_star);
   if (steps.compression_s < shortest_s_) {
     throw SolveError("steps of " + readable_number(steps.compression_s) +
-                     " s in contact are too short: a longer dt is needed or, with dt = 0, a "
-                     "smaller k (k = " +
-                     exact_number(model_.k_N_m) + " N/m here)");
+                     " s in contact are too short: a longer dt is needed or, with dt = 0, a " +
+                     (model_.k_N_m < 1.0 ? "larger" : "smaller") +
+                     " k (k = " + exact_number(model_.k_N_m) + " N/m here)");
   }
   if (model_.step_factor == 1.0) {
     return steps;

@@ -66,5 +66,6 @@ export const dbFlag = (file) => (file ? ` --db ${quoted(file)}` : "");
 const csvField = (value) =>
   /[",\r\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : String(value ?? "");
 
-/** Formats rows of values as a CSV file. */
-export const csv = (rows) => rows.map((row) => `${row.map(csvField).join(",")}\r\n`).join("");
+/** Formats rows of values as a CSV file. Readers skip empty lines, so an empty row is `""`. */
+export const csv = (rows) =>
+  rows.map((row) => `${row.map(csvField).join(",") || '""'}\r\n`).join("");

@@ -500,7 +500,7 @@ protocol::StudyQuery BinsAnswer::counts_query() {
   counts_.resize(size);
   means_.resize(z_ ? size : 0, std::numeric_limits<float>::quiet_NaN());
   protocol::StudyQuery query = this->query();
-  query.add_select(fmt::format("CASE WHEN {} THEN {} END AS bin", is_inside, bin));
+  query.add_select(fmt::format("CASE WHEN {} THEN CAST({} AS INTEGER) END AS bin", is_inside, bin));
   query.add_select("count(*)");
   if (z_) {
     query.add_select(fmt::format("avg({})", z_->name));

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "proto/recipe/model_message.h"
+#include "proto/text.h"
 #include "proto/wire/chunk.h"
 #include "server/study/limits.h"
 #include "server/web/status/snapshot.h"
@@ -52,28 +53,19 @@ ordered_json json_of(const protocol::Cell& cell) {
   return nullptr;
 }
 
-/// Formats a field as in RFC 4180; NULL is an empty field.
-std::string csv_field(const ordered_json& value) {
-  if (!value.is_string()) {
-    return value.is_null() ? std::string() : value.dump();
-  }
-  const auto& text = value.get_ref<const std::string&>();
-  if (text.find_first_of("\",\r\n") == std::string::npos) {
-    return text;
-  }
-  std::string quoted = "\"";
-  for (const char c : text) {
-    quoted += c == '"' ? "\"\"" : std::string(1, c);
-  }
-  return quoted + '"';
-}
-
+/// Formats a line of CSV. NULL is an empty field, but `""` on its own, because readers skip empty
+/// lines.
 std::string csv_line(const ordered_json& values) {
-  std::string fields;
+  std::string line;
   for (const ordered_json& value : values) {
-    fields += (&value == &values.front() ? "" : ",") + csv_field(value);
+    line += &value == &values.front() ? "" : ",";
+    if (value.is_string()) {
+      protocol::append_csv_field(line, value.get_ref<const std::string&>());
+    } else if (!value.is_null()) {
+      line += value.dump();
+    }
   }
-  return fields + "\r\n";
+  return (line.empty() ? "\"\"" : line) + "\r\n";
 }
 
 class RowStream {

@@ -154,7 +154,7 @@ TEST_F(FitCommand, ReportsWrongInput) {
   EXPECT_THAT(error_of({"--e", "1,0.9", "--fit", "k=1e7:1e8", "--sd", "1%"}),
               HasSubstr("fit takes one value"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8:1e8", "--sd", "1%"}),
-              HasSubstr("must be between them"));
+              HasSubstr("k from 1e+07 to 1e+08 with the start 1e+08: the bounds must rise"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8", "--fit", "eta2=1:2", "--sd", "1%"}),
               HasSubstr("2 unknowns cannot be determined by 1 measured"));
 }

@@ -162,6 +162,11 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
       {{"--of", "colour"}, "--of: unknown output `colour`"},
       {{"--of", "major_modes=3"}, "unknown output `major_modes`"},
       {{"--of", "fn_peak_N"}, "COLUMN=LEVEL"},
+      {{"--of", "fn_peak_N>=5000"},
+       "--of fn_peak_N>=5000: write mode, major_mode, or COLUMN=LEVEL"},
+      {{"--of", "mode=SC"}, "COLUMN=LEVEL"},
+      {{"--of", "fn_peek_N + 1 = 5"}, "did you mean `fn_peak_N`?"},
+      {{"--over", "fn_peek_N / 2"}, "--over \"(fn_peek_N / 2)\" is not allowed"},
       {{"--over", "mode"}, "--over: the values of mode are texts"},
       {{"--over", "fn_peak_N,ft_peak_N"}, "a picture shows one output"},
       {{"--elements-per-link", "200"}, "--elements-per-link 200 is too many"},
@@ -186,6 +191,10 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
     EXPECT_EQ(ran.exit_code, 2) << ran.out;
     EXPECT_THAT(ran.err, HasSubstr(message));
   }
+  const auto large = test::run_oblique(folder, {"map", "--x", "mu=0:1", "--y", "H=0.3:1", "--e",
+                                                "1", "--cells", "512", "--bracket", "1e-8"});
+  EXPECT_EQ(large.exit_code, 2) << large.out;
+  EXPECT_THAT(large.err, HasSubstr("--cells 512 --bracket 1e-08: a map may need 20 MiB"));
   EXPECT_FALSE(std::filesystem::exists(folder.file("oblique.db")));
 }
 

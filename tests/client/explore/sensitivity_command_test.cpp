@@ -65,7 +65,8 @@ TEST(Sensitivity, ContinuesWhatIsStoredAndOtherOutputsCostNoPoint) {
   const auto again = sensitivity(folder, flags);
   EXPECT_EQ(again.out, first.out) << "the same to the bit";
   auto other = flags;
-  other.insert(other.end(), {"--of", "stick_total_s > 0", "--out", folder.file("stick.json")});
+  other.insert(other.end(),
+               {"--of", "stick_total_s > 0,max(mu, e)", "--out", folder.file("stick.json")});
   const auto stick = sensitivity(folder, other);
   EXPECT_THAT(stick.out, HasSubstr("\nstick_total_s > 0,e,"));
   EXPECT_THAT(stick.err, HasSubstr("64 of 64 points are done"));
@@ -188,6 +189,7 @@ TEST(Sensitivity, WrongFlagsAreRefusedBeforeAnythingIsSolved) {
     return outcome.err;
   };
   EXPECT_THAT(objection({"--of", "fn_peek_N"}), HasSubstr("did you mean `fn_peak_N`?"));
+  EXPECT_THAT(objection({"--of", "stick_totl_s > 0"}), HasSubstr("did you mean `stick_total_s`?"));
   EXPECT_THAT(objection({"--method", "sobel"}), HasSubstr("sobol"));
   EXPECT_THAT(objection({"--interval", "0"}), HasSubstr("--interval"));
   EXPECT_THAT(objection({"--method", "morris", "--interval", "0.1"}), HasSubstr("--interval"));

@@ -54,6 +54,14 @@ TEST(Formats, AreValidWithoutRows) {
   EXPECT_EQ(printed(Format::kJsonLines, none), "");
 }
 
+TEST(Csv, HasNoEmptyLineForANull) {
+  const auto null = chunk_of({"x"}, {{protocol::Value()}});
+  EXPECT_EQ(printed(Format::kCsv, {null, null, chunk_of({"x"}, {{2.0}, {"\"\""}})}),
+            "x\n\"\"\n\"\"\n2\n\"\"\"\"\"\"\n");
+  EXPECT_EQ(printed(Format::kCsv, {chunk_of({"x", "y"}, {{protocol::Value(), protocol::Value()}})}),
+            "x,y\n,\n");
+}
+
 TEST(JsonLines, HaveOneObjectPerLine) {
   EXPECT_EQ(
       printed(Format::kJsonLines, {chunk_of({"n", "x", "s"}, {{std::int64_t{1}, 2.0, "a\nb"}}),

@@ -62,6 +62,8 @@ TEST(CsvFile, AnErrorNamesFileLineAndColumn) {
   EXPECT_THAT(csv_error("drop\n-1\n"), HasSubstr("measured.csv:2: column `drop`: mu = -1"));
   EXPECT_THAT(csv_error("drop\nnan\n"), HasSubstr("measured.csv:2: column `drop`: mu = nan"));
   EXPECT_THAT(csv_error("drop\ninf\n"), HasSubstr("mu = inf"));
+  EXPECT_THAT(csv_error("drop\n1e-400\n"), HasSubstr("is not a number: it is too small"));
+  EXPECT_THAT(csv_error("drop\n0.4\u00a0\n"), HasSubstr("\"0.4\\xa0\" is not a number"));
   EXPECT_THAT(csv_error("drop,b\n1\n"), HasSubstr("measured.csv:2: the line has 1 fields"));
   EXPECT_THAT(csv_error("drop\n0,4\n"), HasSubstr("measured.csv:2: the line has 2 fields"));
   EXPECT_THAT(csv_error("drop\n\"1\n"), HasSubstr("measured.csv:2: a quote is not closed"));
@@ -73,7 +75,8 @@ TEST(CsvFile, NeedsColumnNames) {
   EXPECT_THAT(csv_error(""), HasSubstr("it needs a line with column names"));
   EXPECT_THAT(csv_error("drop\n"), HasSubstr("and lines with values"));
   EXPECT_THAT(csv_error("0.4,0.5\n0.6,0.7\n"), HasSubstr("it must name the columns"));
-  EXPECT_THAT(csv_error("drop;mu\n1;2\n"), HasSubstr("semicolons"));
+  EXPECT_THAT(csv_error("drop;mu\n1;2\n"), HasSubstr("semicolons: use commas"));
+  EXPECT_THAT(csv_error("drop\tmu\n1\t2\n"), HasSubstr("tabs: use commas"));
   EXPECT_THAT(csv_error("drop,\n1,2\n"), HasSubstr("column 2 has no name"));
   EXPECT_THAT(csv_error("drop,drop\n1,2\n"), HasSubstr("two columns are called `drop`"));
   EXPECT_THAT(csv_error("dorp,b\n1,2\n"), HasSubstr("no column `drop` (did you mean `dorp`?)"));

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "proto/recipe/blocks.h"
+#include "proto/recipe/model_message.h"
 #include "proto/recipe/point_table.h"
 #include "tests/client/study/fake_reach.h"
 #include "tests/support/temporary_folder.h"
@@ -64,6 +65,22 @@ TEST(PointFlags, TakeValuesListsAndRanges) {
   EXPECT_EQ(values("mu", "0:1:3:linear"), (std::vector{0.0, 0.5, 1.0}));
   EXPECT_EQ(values("mu", "0.5:1:step=0.25"), (std::vector{0.5, 0.75, 1.0}));
   EXPECT_EQ(values("integrator", "explicit"), (std::vector{0.0}));
+}
+
+TEST(PointFlags, MayHaveSpacesAfterSeparators) {
+  EXPECT_EQ(values("mu", "0.1, 0.2,  1e-3"), (std::vector{0.1, 0.2, 1e-3}));
+  EXPECT_EQ(values("mu", "0: 1: 3"), (std::vector{0.0, 0.5, 1.0}));
+  EXPECT_EQ(values("integrator", "explicit, generalized-alpha"), (std::vector{0.0, 1.0}));
+}
+
+TEST(PointFlags, AZeroHasNoSign) {
+  const auto digest = [](const std::string& mu) {
+    return protocol::recipe_digest(
+        recipe_of_flags(flags_of({{"H", "1"}, {"mu", mu}, {"e", "1"}}), fake_reach()));
+  };
+  EXPECT_EQ(digest("-0.0"), digest("0"));
+  EXPECT_EQ(digest("-0:1:3"), digest("0:1:3"));
+  EXPECT_EQ(digest("0.5,-0.0"), digest("0.5,0"));
 }
 
 TEST(PointFlags, TakeColumnsOfFiles) {
@@ -128,6 +145,12 @@ TEST(PointFlags, RefuseWrongValuesWithTheFlagAsItWasTyped) {
       {"mu", "abc", "\"abc\" is not a number"},
       {"mu", "0.4,", "a value is missing"},
       {"mu", "0.4 ", "is not a number"},
+      {"mu", "1e-400", "it is too small or too large"},
+      {"mu", "0.2,1e-400", "it is too small or too large"},
+      {"mu", "0.1:1e400:3", "is not a number: it is too small or too large"},
+      {"mu", "0.4\u00a0", "\"0.4\\xa0\" is not a number"},
+      {"mu", "0.1:0.5:3.0", "count must be a whole number without a point"},
+      {"mu", "0.1 0.2", "\"0.1 0.2\" is not a number"},
       {"mu", "0.1:2", "from:to:count"},
       {"mu", "0.1:2:4:5", "from:to:count:log"},
       {"mu", "0:2:4:log", "must be > 0"},

@@ -195,6 +195,26 @@ TEST(StudyFile, TakesExpressionsFiltersAndSingleLengths) {
   EXPECT_EQ(protocol::size_of(table).points, 4U);
 }
 
+TEST(StudyFile, AZeroHasNoSign) {
+  const auto minus = parsed(block_with("mu = -0.0"));
+  EXPECT_EQ(protocol::recipe_digest(minus.recipe),
+            protocol::recipe_digest(parsed(block_with("mu = 0.0")).recipe));
+}
+
+TEST(StudyFile, ACountMayBeWrittenWithAPoint) {
+  const auto study = parsed(block_with("mu = { from = 0.1, to = 0.5, count = 3.0 }"));
+  EXPECT_EQ(protocol::PointTable(study.recipe).size(), 3U);
+}
+
+TEST(StudyFile, ADescriptionOfTheLargestRecipeCanBeRead) {
+  const test::TemporaryFolder folder;
+  const std::string file = folder.file("large.toml");
+  // A number of up to 27 characters takes 8 bytes in a recipe.
+  std::ofstream(file) << block_with("mu = 0.4")
+                      << std::string(protocol::kMaxRecipeBytes / 8 * 27, '#') << '\n';
+  EXPECT_EQ(protocol::PointTable(read_study_file(file, fake_reach()).recipe).size(), 1U);
+}
+
 TEST(ExampleStudies, HaveTheNumberOfPointsInTheirComments) {
   const std::string folder = std::string(OBLIQUE_SOURCE_DIR) + "/deploy/studies/";
   const auto points = [&](const std::string& name) {

@@ -143,6 +143,9 @@ TEST_F(ConfigurationTest, ReadingThePrintedSettingsGivesTheSameSettings) {
   EXPECT_EQ(options_.db, "default.db");
   EXPECT_TRUE(options_.listen.empty());
   const std::string odd = "a \"b\" \\ 'c' \x1b\xc3\xa4.db";
+  EXPECT_EQ(parse({"--db", "3", "--keys", "true"}), std::nullopt);
+  EXPECT_EQ(parse({"--config", write(printed_)}), std::nullopt) << errors_ << printed_;
+  EXPECT_EQ(options_.db + options_.keys, "3true");
   EXPECT_EQ(parse({"--db", odd, "--port", "9", "--loud", "--listen", "::1", "--quiet",
                    "--limits-connections", "6"}),
             std::nullopt)
@@ -166,11 +169,17 @@ TEST_F(ConfigurationTest, ErrorsInTheFileHaveTheirLine) {
   refuse("\nprot = 5\n", "a.toml:2:1: there is no setting prot (did you mean `port`?)");
   refuse("[limits]\nconections = 5\n", "did you mean `limits_connections`?");
   refuse("port = 99999\n", "a.toml:1:1: --port: Value 99999 not in range 0 to 65535");
-  refuse("port = true\n", "a.toml:1:1: --port: Value true not in range 0 to 65535");
-  refuse("port = []\n", "a.toml:1:8: port = [] is not allowed");
+  refuse("port = true\n", "a.toml:1:8: port = true is not allowed: it must be a number");
+  refuse("port = \"80\"\n", "a.toml:1:8: port = '80' is not allowed: it must be a number");
+  refuse("port = []\n", "a.toml:1:8: port = [] is not allowed: it must be a number");
+  refuse("db = 3\n", "a.toml:1:6: db = 3 is not allowed: it must be a string");
+  refuse("db = true\n", "a.toml:1:6: db = true is not allowed: it must be a string");
+  refuse("\nlisten = [\"::1\", 5]\n", "a.toml:2:18: listen = 5 is not allowed");
+  refuse("[log]\nlevel = 1\n", "a.toml:2:9: log_level = 1 is not allowed: it must be a string");
+  refuse("loud = 1\n", "a.toml:1:8: loud = 1 is not allowed: it must be a boolean");
   refuse("port = [1, 2]\n", "a.toml:1:1: --port was given more than once");
   refuse("port = 1979-05-27\n", "a.toml:1:8: port = 1979-05-27 is not allowed");
-  refuse("loud = \"perhaps\"\n", "a.toml:1:1: Could not convert: --loud = perhaps");
+  refuse("loud = \"perhaps\"\n", "a.toml:1:8: loud = 'perhaps' is not allowed");
   refuse("loud = \n", "a.toml:1:");
   refuse("db = \"\"\n", "a.toml:1:6: db = ");
   refuse("ready_fd = 1\n", "there is no setting ready_fd");

@@ -170,6 +170,13 @@ TEST(StudyName, IsRefusedAndShownEscapedIfItHasInvisibleCharacters) {
   }
 }
 
+TEST(StudyName, IsRefusedIfAnotherNameLooksTheSame) {
+  EXPECT_EQ(study_name_error("\u00e9t\u00e9"), "");
+  for (const auto& name : {"e\u0301"s, "a\u0327"s, "o\u0345"s, "a\u00a0b"s}) {
+    EXPECT_THAT(study_name_error(name), HasSubstr("combining marks, no-break spaces")) << name;
+  }
+}
+
 TEST(StudyPriority, IsWithinLimitsThatTheErrorNames) {
   for (const std::int64_t priority : {-1000, 0, 1000}) {
     EXPECT_EQ(priority_error(priority), "");

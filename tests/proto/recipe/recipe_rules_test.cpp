@@ -215,6 +215,19 @@ TEST(RecipeRules, AStudyHasABoundedNumberOfExpressionsBlocksAndPoints) {
   }
 }
 
+TEST(RecipeRules, ARangeWhoseValuesWouldBeEqualIsRefused) {
+  const double above = std::nextafter(0.3, 1.0);
+  for (const Axis& axis : {range("mu", 0.3, above, 3), log_range("mu", 0.3, above, 3),
+                           range("mu", 0.3, 0.3 + 1e-14, 1000), range("mu", 0.0, 5e-324, 3),
+                           log_range("mu", 0.3, 0.3 * (1.0 + 1e-13), 10'000)}) {
+    EXPECT_THAT(refusal(of_mu(axis)), HasSubstr("some of the values would be equal"));
+  }
+  for (const Axis& axis : {range("mu", 0.3, 0.3 + 1e-14, 10), range("mu", 0.0, 1e-300, 1000),
+                           log_range("mu", 1e-3, 1.0, 1'000'000'000)}) {
+    EXPECT_EQ(refusal(of_mu(axis)), "");
+  }
+}
+
 TEST(RecipeRules, ARecipeTooLongForAWorkerIsRefused) {
   Recipe recipe = recipe_of({{listed("mu", {})}});
   recipe.mutable_blocks(0)->mutable_axes(0)->mutable_values()->Resize(1 << 20, 0.5);

@@ -64,4 +64,13 @@ std::optional<double> number_of(std::string_view text) {
   return error == std::errc() && rest == end ? std::optional(value) : std::nullopt;
 }
 
+std::string_view why_no_number(std::string_view text) {
+  double value = 0.0;
+  text.remove_prefix(text.starts_with('+') ? 1 : 0);
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, value);
+  const bool is_number = error == std::errc::result_out_of_range && rest == end;
+  return is_number ? ": it is too small or too large" : "";
+}
+
 }  // namespace oblique::solver

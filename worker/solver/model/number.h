@@ -31,4 +31,7 @@ std::string signed_number(double value, int decimals);
 /// text, such as one with spaces or a plus.
 std::optional<double> number_of(std::string_view text);
 
+/// Returns why a text such as 1e-400 is no number, to follow "is not a number"; or an empty text.
+std::string_view why_no_number(std::string_view text);
+
 }  // namespace oblique::solver

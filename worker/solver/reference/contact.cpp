@@ -154,7 +154,7 @@ void Contact::accept(const TipState& end, const ContactIntegrals<double>& integr
   if (steps_ > kMaxSteps) {
     throw SolveError("the contact takes more than " + std::to_string(kMaxSteps) + " steps of " +
                      readable_number(full_step_s()) +
-                     " s: a longer dt, a looser tolerance or a smaller k takes fewer");
+                     " s: a longer dt, a looser tolerance or a larger k takes fewer");
   }
 }
 

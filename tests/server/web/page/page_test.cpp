@@ -349,6 +349,8 @@ TEST_F(PageStudyTest, RowsAreQueriedAsOnTheCommandLine) {
   EXPECT_EQ(rows["rows"][0][0], 17);
   const std::string csv = page_.get("/api/studies/1/rows?select=point,mode&limit=1&format=csv");
   EXPECT_EQ(body_of(csv), "point,mode\r\n0,SC SR sR\r\n");
+  EXPECT_EQ(body_of(page_.get("/api/studies/1/rows?select=NULL+AS+x&limit=2&format=csv")),
+            "x\r\n\"\"\r\n\"\"\r\n");
   const std::string wrong = page_.get("/api/studies/1/rows?where=muu%20%3E%201");
   EXPECT_EQ(status_of_answer(wrong), 400);
   EXPECT_THAT(wrong, HasSubstr("did you mean `mu`?"));
