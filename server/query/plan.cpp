@@ -815,7 +815,6 @@ void check_output(const char* flag, const std::string& text) {
   }
   const DatabaseHandle database = open_database(":memory:", SQLITE_OPEN_READWRITE);
   create_tables(database.get());
-  create_views(database.get());
   restrict_to_reading(database.get());
   protocol::StudyQuery question;
   question.add_select(fmt::format("({})", text));  // `*` and several columns are invalid here
