@@ -71,7 +71,7 @@ TEST_F(ReaderTest, AQueryOfAStudyIsAnsweredWithUnits) {
   const auto chunk = first_chunk("a", "H, status");
   EXPECT_EQ(chunk.chunk_rows(), 3U);
   EXPECT_THAT(chunk.units(), ElementsAre("m", ""));
-  EXPECT_THROW(first_chunk("no such", "H"), solver::InputError);
+  EXPECT_THROW(first_chunk("no such", "H"), NoSuchStudy);
   EXPECT_THROW(first_chunk("a", "median(status)"), QueryError);
 }
 
