@@ -218,7 +218,7 @@ std::vector<std::string> faults_of_pages(sqlite3* database) {
   }
   std::erase(found, "ok");
   std::ranges::sort(found);
-  found.erase(std::ranges::unique(found).begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 
