@@ -88,17 +88,19 @@ int supervise(protocol::StopSignals& stop, std::span<SolvingSlot> slots,
       return protocol::stop_with_parent(parent) ? work(hello) : 0;
     }
     held.close();
+    bool is_stopping = false;
     pollfd items[] = {{stop.descriptor(), POLLIN, 0}, {alive.number(), 0, 0}};
     while (items[1].revents == 0) {
       if (poll(items, std::size(items), -1) > 0 && items[0].revents != 0) {
+        is_stopping = true;
         stop.requested();
         kill(child, SIGTERM);
       }
     }
     int status = 0;
     check_call(waitpid(child, &status, 0) == child, kNoProcess);
-    if (WIFEXITED(status)) {
-      return WEXITSTATUS(status);
+    if (WIFEXITED(status) || is_stopping) {
+      return WIFEXITED(status) ? WEXITSTATUS(status) : 0;
     }
     protocol::EndedProcess ended;
     ended.set_process_id(hello.process_id());

@@ -151,14 +151,19 @@ int fit_to_paper(const FitFlags& flags, Console& console) {
 /// Parses KEY=FROM:TO or KEY=FROM:TO:START.
 Unknown unknown_of_flag(const std::string& text) {
   const auto equals = std::min(text.find('='), text.size());
-  std::vector<double> numbers;
-  for (const auto part : protocol::split(std::string_view(text).substr(equals), ':')) {
-    const auto number = part.substr(part.starts_with('=') ? 1 : 0);
-    numbers.push_back(solver::number_of(number).value_or(kNaN));
-  }
+  const auto parts =
+      protocol::split(std::string_view(text).substr(std::min(equals + 1, text.size())), ':');
   try {
-    if (numbers.size() < 2 || numbers.size() > 3) {
+    if (parts.size() < 2 || parts.size() > 3) {
       throw InputError("write KEY=FROM:TO, as k=1e7:1e8, or KEY=FROM:TO:START");
+    }
+    std::vector<double> numbers;
+    for (const auto part : parts) {
+      const auto number = solver::number_of(part);
+      if (!number) {
+        throw InputError(fmt::format("{:?} is not a number{}", part, solver::why_no_number(part)));
+      }
+      numbers.push_back(*number);
     }
     const auto& key = protocol::axis_key(text.substr(0, equals));
     Unknown unknown{std::string(key.name), numbers[0], numbers[1], numbers.back()};

@@ -101,16 +101,32 @@ MapAxis parse_axis(const char* flag, const std::string& text, const MapGrid& gri
   return axis;
 }
 
+/// Returns the place of the = before the level in --of, if it is the only comparison outside
+/// brackets.
+std::size_t level_place(std::string_view of) {
+  int depth = 0;
+  std::size_t place = std::string_view::npos;
+  for (std::size_t i = 0; i < of.size(); ++i) {
+    depth += of[i] == '(' ? 1 : of[i] == ')' ? -1 : 0;
+    if (depth == 0 && std::string_view("<>=!").find(of[i]) != std::string_view::npos) {
+      if (of[i] != '=' || place != std::string_view::npos) {
+        return std::string_view::npos;
+      }
+      place = i;
+    }
+  }
+  return place;
+}
+
 /// Returns SQL over the view `runs` for the region of a point, as --of defines it: the value of a
 /// text column, or the side of the level on which a number lies. Throws InputError.
 std::string sql_of_region(const std::string& of) {
-  auto equals = of.rfind('=');
-  if (equals != std::string::npos && of.find_last_of("<>=!", equals - 1) + 1 == equals) {
-    equals = std::string::npos;  // a comparison, such as >=
-  }
+  const auto equals = level_place(of);
   const auto outputs = outputs_of_flag(of.substr(0, equals), true);
-  const auto level =
-      equals == std::string::npos ? std::nullopt : solver::number_of(of.substr(equals + 1));
+  const auto level = equals == std::string::npos
+                         ? std::nullopt
+                         : solver::number_of(std::string_view(of).substr(
+                               std::min(of.find_first_not_of(' ', equals + 1), of.size())));
   const auto& output = outputs.front();
   const bool is_text = server::kind_of_values(output) == protocol::CellKind::kText;
   if (outputs.size() != 1 || level.has_value() == is_text ||
@@ -126,7 +142,8 @@ std::string sql_of_region(const std::string& of) {
     return fmt::format("WHEN ({}) {} {} THEN {}", output, comparison, number,
                        server::sql_text(fmt::format("{} {} {}", output, comparison, number)));
   };
-  return fmt::format("CASE {} {} END", side(">"), side("<="));
+  return fmt::format("CASE WHEN typeof({}) <> 'text' THEN CASE {} {} END END", output, side(">"),
+                     side("<="));
 }
 
 /// Returns SQL for the region of a point and, if given, the output of --over. Throws InputError.

@@ -57,6 +57,8 @@ PYBIND11_MODULE(_core, module) {
       PyErr_SetString(PyExc_ValueError, error.what());
     } catch (const oblique::server::StatementError& error) {
       PyErr_SetString(PyExc_ValueError, error.what());
+    } catch (const oblique::server::NoSuchStudy& error) {
+      PyErr_SetString(PyExc_ValueError, error.what());
     } catch (const oblique::server::QueryError& error) {
       PyErr_SetString(database_error, error.what());
     } catch (const std::filesystem::filesystem_error& error) {

@@ -157,6 +157,14 @@ void copy_tables(sqlite3* from, sqlite3* to, Salvaged& saved) {
                .before_first = -1},
               saved);
   }
+  try {
+    for (const std::string& study : texts(from, "SELECT DISTINCT study_id FROM results")) {
+      if (texts(to, "SELECT 1 FROM studies WHERE study_id = " + study).empty()) {
+        saved.losses.insert(fmt::format("study {} is lost, with all its results", study));
+      }
+    }
+  } catch (const StorageError&) {  // a damaged page, which is counted above
+  }
 }
 
 /// Renames and pauses each study whose recipe, models or workers do not match their checksums,
@@ -183,11 +191,13 @@ void set_changed_studies_aside(sqlite3* database, Salvaged& saved) {
                                 changed, kStudyChecksum, model_checksum_sql(), kWorkerChecksum));
 }
 
-/// Removes or repairs references to lost rows, and counts completed points. `check` still compares
-/// results with recipes.
-void mend(sqlite3* database) {
+/// Removes or repairs references to lost rows, and counts completed points.
+void mend(sqlite3* database, Salvaged& saved) {
+  execute(database, "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models)");
+  if (const int lost = sqlite3_changes(database); lost > 0) {
+    saved.losses.insert(fmt::format("{} results are lost, because their model is", lost));
+  }
   execute(database,
-          "DELETE FROM results WHERE model_id NOT IN (SELECT model_id FROM models);"
           // Results keep the number of a lost worker, so that their checksums stay right. If all
           // other workers have the same solver version, the lost worker gets this version too.
           "INSERT INTO workers"
@@ -297,8 +307,11 @@ Salvaged salvage(const std::string& from, const std::string& to) {
     target.write([&] {
       copy_tables(source.get(), target.connection(), saved);
       set_changed_studies_aside(target.connection(), saved);
-      mend(target.connection());
+      mend(target.connection(), saved);
     });
+    for (std::string& fault : diagnose_contents(target.connection()).faults) {
+      saved.losses.insert(std::move(fault));
+    }
     saved.results = std::stoull(texts(target.connection(), "SELECT count(*) FROM results").at(0));
     execute(target.connection(), "PRAGMA journal_mode = DELETE");
   }

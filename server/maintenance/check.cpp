@@ -1,7 +1,9 @@
 #include "server/maintenance/check.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -280,6 +282,12 @@ Diagnosis diagnose_contents(sqlite3* database) {
 Diagnosis diagnose(const std::string& path) {
   const DatabaseHandle opened = open_stored(path);
   sqlite3* database = opened.get();
+  std::array<char, 2> versions{};  // of the format, 1 or 2; SQLite writes to no later version
+  std::ifstream(path, std::ios::binary).seekg(18).read(versions.data(), versions.size());
+  if (std::ranges::any_of(versions, [](char version) { return version != 1 && version != 2; })) {
+    return {{"bytes 18 and 19 of the file's header are damaged, so that nothing can be written"},
+            {}};
+  }
   if (auto faults = faults_of_pages(database); !faults.empty()) {
     return {std::move(faults), {}};  // with damaged pages, other checks mean nothing
   }

@@ -60,7 +60,8 @@ void check_studies(sqlite3* database) {
   }
 }
 
-/// Returns why this version refuses the study, or "". Throws StorageError for an unreadable recipe.
+/// Returns why this version refuses the study, or "". Throws StorageError for an unreadable recipe
+/// of a study that is not paused; `oblique backup --salvage` pauses such a study.
 std::string study_error(const StoredStudy& study) {
   if (!protocol::is_utf8(study.name)) {  // the name is part of messages, which must be UTF-8
     return "its name is not UTF-8: rename it with sqlite3 while no server runs";
@@ -70,6 +71,10 @@ std::string study_error(const StoredStudy& study) {
   } catch (const solver::InputError& reason) {
     return reason.what();
   } catch (const std::runtime_error& reason) {
+    if (study.state == StudyState::kPaused) {
+      return fmt::format("its recipe cannot be read: {}; `oblique delete` removes it",
+                         reason.what());
+    }
     throw StorageError(fmt::format(
         "the recipe of study {} cannot be read: {}. `oblique check --db FILE` lists all faults",
         study.name, reason.what()));

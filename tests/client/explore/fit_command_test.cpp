@@ -142,6 +142,8 @@ TEST_F(FitCommand, ReportsWrongInput) {
   };
   EXPECT_THAT(error_of({"--e", "1"}), HasSubstr("give --fit KEY=FROM:TO"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k", "--sd", "1%"}), HasSubstr("write KEY=FROM:TO"));
+  EXPECT_THAT(error_of({"--e", "1", "--fit", "k=abc:1e8", "--sd", "1%"}),
+              HasSubstr("\"abc\" is not a number"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "kk=1:2", "--sd", "1%"}), HasSubstr("kk"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "links=2:4", "--sd", "1%"}), HasSubstr("links"));
   EXPECT_THAT(error_of({"--e", "1", "--fit", "k=1e7:1e8"}),

@@ -164,6 +164,7 @@ TEST(MapCommand, ReportsWrongInputBeforeItSolvesAnything) {
       {{"--of", "fn_peak_N"}, "COLUMN=LEVEL"},
       {{"--of", "fn_peak_N>=5000"},
        "--of fn_peak_N>=5000: write mode, major_mode, or COLUMN=LEVEL"},
+      {{"--of", "fn_peak_N>=5000=1"}, "COLUMN=LEVEL"},
       {{"--of", "mode=SC"}, "COLUMN=LEVEL"},
       {{"--of", "fn_peek_N + 1 = 5"}, "did you mean `fn_peak_N`?"},
       {{"--over", "fn_peek_N / 2"}, "--over \"(fn_peek_N / 2)\" is not allowed"},

@@ -223,10 +223,10 @@ TEST(Csv, QuotesTextThatWouldBreakALineAndWritesOtherTextUnchanged) {
             "\x1b[2J\u202e\n");
 }
 
-TEST(Csv, DistinguishesNullFromEmptyText) {
-  auto rows = rows_of_texts({""});
-  rows.rows.emplace_back().emplace_back();
-  EXPECT_EQ(whole(rows, Format::kCsv), "text\n\"\"\n\n");
+TEST(Csv, DistinguishesNullFromEmptyTextInSeveralColumns) {
+  const protocol::Table rows{.columns = {"text", "number"},
+                             .rows = {{std::string(), std::int64_t{1}}, {{}, std::int64_t{1}}}};
+  EXPECT_EQ(whole(rows, Format::kCsv), "text,number\n\"\",1\n,1\n");
 }
 
 TEST(Json, WritesEveryNumberToTheLastBitAndKeepsTheOrderOfColumns) {

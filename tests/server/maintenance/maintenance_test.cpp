@@ -178,14 +178,32 @@ TEST_F(SalvageTest, AStudyWhoseRecipeModelOrWorkerIsDamagedIsKeptUnderAnotherNam
     execute_sql(damage);
     EXPECT_THAT(faults(), Not(IsEmpty())) << damage;
     EXPECT_THAT(salvage(path_, copy_).losses,
-                ElementsAre(HasSubstr("study 2, b: its recipe, a model or a worker was changed")))
+                Contains(HasSubstr("study 2, b: its recipe, a model or a worker was changed")))
         << damage;
+    EXPECT_NO_THROW(Store(copy_).studies()) << damage;  // a server starts
     EXPECT_THAT(rows(copy_, "SELECT name || ' ' || state FROM studies"),
                 ElementsAre("a running", testing::StartsWith("damaged study 2 ")));
     EXPECT_EQ(rows_of(copy_), rows_of(path_)) << damage;
     std::filesystem::remove(copy_);
     std::filesystem::copy_file(sound, path_, std::filesystem::copy_options::overwrite_existing);
   }
+}
+
+TEST_F(SalvageTest, ResultsThatAreLostWithTheirStudyOrModelAreNamed) {
+  close();
+  execute_sql("UPDATE models SET model_id = 7");
+  EXPECT_THAT(salvage(path_, copy_).losses,
+              Contains(testing::EndsWith("results are lost, because their model is")));
+  std::filesystem::remove(copy_);
+  execute_sql("DELETE FROM studies");
+  EXPECT_THAT(salvage(path_, copy_).losses,
+              Contains(HasSubstr("study 1 is lost, with all its results")));
+}
+
+TEST_F(SalvageTest, AnUnknownVersionOfTheFormatIsAFault) {
+  close();
+  std::fstream(path_, std::ios::in | std::ios::out | std::ios::binary).seekp(18).put(18);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("bytes 18 and 19")));
 }
 
 TEST_F(SalvageTest, DamagedDefinitionsCostNoRowAndMixUpNoColumn) {
