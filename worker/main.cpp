@@ -117,8 +117,8 @@ std::string set_exit(oblique::worker::ExitSettings& exit, double idle_exit_s) {
 
 /// Solves until the worker is stopped. Runs in the child of the process that the user started.
 int run_worker(SessionSettings& settings, std::uint64_t fall_memory_bytes,
-               oblique::protocol::StopSignals& stop) {
-  oblique::protocol::Notifier notifier;
+               oblique::protocol::StopSignals& stop, int forwarder) {
+  oblique::protocol::Notifier notifier(forwarder);
   oblique::solver::FallCache falls(fall_memory_bytes != 0
                                        ? fall_memory_bytes
                                        : oblique::protocol::available_memory_bytes() /
@@ -171,9 +171,9 @@ int run_supervised(Options& options) {
   }
   SessionSettings& settings = options.session;
   settings.slots = oblique::worker::make_shared_slots(settings.threads);
-  return oblique::worker::supervise(stop, settings.slots, [&](const auto& hello) {
+  return oblique::worker::supervise(stop, settings.slots, [&](const auto& hello, int forwarder) {
     settings.hello = hello;
-    return run_worker(settings, options.fall_memory_bytes, stop);
+    return run_worker(settings, options.fall_memory_bytes, stop, forwarder);
   });
 }
 

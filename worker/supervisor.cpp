@@ -1,8 +1,8 @@
 #include "worker/supervisor.h"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -69,15 +69,16 @@ std::span<SolvingSlot> make_shared_slots(std::size_t threads) {
 }
 
 int supervise(protocol::StopSignals& stop, std::span<SolvingSlot> slots,
-              const std::function<int(const protocol::WorkerHello& hello)>& work) {
+              const std::function<int(const protocol::WorkerHello& hello, int forwarder)>& work) {
   constexpr const char* kNoProcess = "no process can be started to solve";
+  const protocol::Notifier systemd;
   protocol::WorkerHello hello;
   for (unsigned in_vain = 0; !stop.wait(pause_after(in_vain));) {
     hello.set_process_id(protocol::random_id());
     std::uninitialized_value_construct(slots.begin(), slots.end());
     int ends[2];
-    check_call(pipe2(ends, O_CLOEXEC) == 0, kNoProcess);
-    const protocol::Descriptor alive(ends[0]);
+    check_call(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) == 0, kNoProcess);
+    const protocol::Descriptor states(ends[0]);
     protocol::Descriptor held(ends[1]);  // after the fork only the child keeps this end open
     const pid_t parent = getpid();
     const pid_t child = fork();
@@ -85,16 +86,26 @@ int supervise(protocol::StopSignals& stop, std::span<SolvingSlot> slots,
     if (child == 0) {
       // When memory runs out, the system ends this process rather than the parent.
       std::ofstream("/proc/self/oom_score_adj") << "100";
-      return protocol::stop_with_parent(parent) ? work(hello) : 0;
+      return protocol::stop_with_parent(parent) ? work(hello, held.number()) : 0;
     }
     held.close();
     bool is_stopping = false;
-    pollfd items[] = {{stop.descriptor(), POLLIN, 0}, {alive.number(), 0, 0}};
-    while (items[1].revents == 0) {
-      if (poll(items, std::size(items), -1) > 0 && items[0].revents != 0) {
+    pollfd items[] = {{stop.descriptor(), POLLIN, 0}, {states.number(), POLLIN, 0}};
+    std::array<char, 4096> state{};
+    for (ssize_t size = 1; size > 0;) {  // 0: the child has ended
+      if (poll(items, std::size(items), -1) <= 0) {
+        continue;
+      }
+      if (items[0].revents != 0) {
         is_stopping = true;
         stop.requested();
         kill(child, SIGTERM);
+      }
+      if (items[1].revents != 0) {
+        size = recv(states.number(), state.data(), state.size(), 0);
+        if (size > 0) {
+          systemd.send({state.data(), static_cast<std::size_t>(size)});
+        }
       }
     }
     int status = 0;

@@ -137,8 +137,9 @@ bool stop_with_parent(pid_t parent) {
   return getppid() == parent;  // if the parent has already ended, the system sends no signal
 }
 
-Notifier::Notifier()
-    : socket_(environment_value("NOTIFY_SOCKET")),
+Notifier::Notifier(int forwarder)
+    : forwarder_(forwarder),
+      socket_(environment_value("NOTIFY_SOCKET")),
       heartbeat_(std::chrono::microseconds(std::atoll(environment_value("WATCHDOG_USEC").c_str())) /
                  2) {}
 
@@ -165,10 +166,14 @@ void Notifier::feed_watchdog(Clock::time_point now) {
   }
 }
 
-void Notifier::send(const std::string& state) const {
+void Notifier::send(std::string_view state) const {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (socket_.empty() || socket_.size() >= sizeof(address.sun_path)) {
+    return;
+  }
+  if (forwarder_ >= 0) {
+    (void)::send(forwarder_, state.data(), state.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     return;
   }
   std::memcpy(address.sun_path, socket_.data(), socket_.size());

@@ -67,12 +67,14 @@ void add_stop_with_parent(CLI::App& app, pid_t& parent);
 bool stop_with_parent(pid_t parent);
 
 /// Reports the state of the program to systemd, in datagrams to the socket at the path in
-/// NOTIFY_SOCKET. Does nothing if that variable is not set. Ignores errors.
+/// NOTIFY_SOCKET, or to a process that forwards them. Does nothing if that variable is not set.
+/// Ignores errors.
 class Notifier {
  public:
   using Clock = std::chrono::steady_clock;
 
-  Notifier();
+  /// `forwarder` is a connected socket that gets the messages instead; -1: none.
+  explicit Notifier(int forwarder = -1);
 
   /// Reports that the program is ready. `sentence` becomes the status of the service.
   void ready(const std::string& sentence) const;
@@ -83,10 +85,11 @@ class Notifier {
   /// Sends a keep-alive each time half of WATCHDOG_USEC has passed. Must be called several times a
   /// second.
   void feed_watchdog(Clock::time_point now);
+  /// Sends a message in the format of sd_notify(3).
+  void send(std::string_view state) const;
 
  private:
-  void send(const std::string& state) const;
-
+  int forwarder_;
   std::string socket_;         ///< empty: none
   Clock::duration heartbeat_;  ///< 0: none
   Clock::time_point next_heartbeat_;

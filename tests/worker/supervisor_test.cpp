@@ -2,14 +2,20 @@
 
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <csignal>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <functional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -35,7 +41,8 @@ class SupervisorTest : public testing::Test {
 
   /// Supervises children that run `work`, which may die.
   int run(const std::function<int(const Hello&)>& work) {
-    return supervise(stop_, slots_, [&](const Hello& hello) -> int { std::_Exit(work(hello)); });
+    return supervise(stop_, slots_,
+                     [&](const Hello& hello, int) -> int { std::_Exit(work(hello)); });
   }
   static std::vector<std::uint64_t> points_of(const Hello& hello) {
     return {hello.replaced().points().begin(), hello.replaced().points().end()};
@@ -65,6 +72,40 @@ TEST_F(SupervisorTest, TheExitCodeOfTheChildIsReturned) {
               }),
               code);
   }
+}
+
+TEST_F(SupervisorTest, TheServiceManagerGetsMessagesOfTheChildFromTheParent) {
+  const std::string name = "@oblique-supervisor-" + std::to_string(getpid());
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  name.copy(address.sun_path + 1, name.size() - 1, 1);
+  const int manager = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  const int yes = 1;
+  ASSERT_EQ(setsockopt(manager, SOL_SOCKET, SO_PASSCRED, &yes, sizeof(yes)), 0);
+  ASSERT_EQ(bind(manager, reinterpret_cast<const sockaddr*>(&address),
+                 static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + name.size())),
+            0);
+  setenv("NOTIFY_SOCKET", name.c_str(), 1);
+  EXPECT_EQ(supervise(stop_, slots_,
+                      [&](const Hello&, int forwarder) -> int {
+                        protocol::Notifier(forwarder).ready("x");
+                        std::_Exit(kAsExpected);
+                      }),
+            kAsExpected);
+  unsetenv("NOTIFY_SOCKET");
+  std::array<char, 100> text{};
+  std::array<char, CMSG_SPACE(sizeof(ucred))> control{};
+  iovec part{text.data(), text.size()};
+  msghdr message{};
+  message.msg_iov = &part;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  ASSERT_GT(recvmsg(manager, &message, MSG_DONTWAIT), 0);
+  close(manager);
+  EXPECT_STREQ(text.data(), "READY=1\nSTATUS=x");
+  ucred sender{};
+  std::memcpy(&sender, CMSG_DATA(CMSG_FIRSTHDR(&message)), sizeof(sender));
+  EXPECT_EQ(sender.pid, getpid());
 }
 
 TEST_F(SupervisorTest, AfterACrashTheNextChildReportsSignalAndPoints) {

@@ -37,7 +37,7 @@ test("points that are solved while a study is loading are shown", async () => {
         const answer = await real(path, how);
         const changed = async (fields) =>
           new Response(JSON.stringify({ ...(await answer.json()), ...fields }));
-        if (path === "/api/studies/1") return changed({ state: "running" });
+        if (path === "api/studies/1") return changed({ state: "running" });
         return /\/rows\?.*select=point/.test(path) && ++tables === 1
           ? changed({ rows: [] })
           : answer;

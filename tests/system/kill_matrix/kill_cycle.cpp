@@ -375,7 +375,7 @@ struct Table {
 std::vector<Table> tables() {
   return {
       {"studies",
-       {"created_at", "changed_at", "checksum", "submitted_by", "counted"},
+       {"created_at", "changed_at", "checksum", "submitted_by", "counted", "uid"},
        "",
        "study_id"},
       {"models", {"model_id"}, "", "definition"},
