@@ -60,10 +60,12 @@ void check_studies(sqlite3* database) {
   }
 }
 
-/// Returns why this version refuses the study, or "". Throws StorageError for an unreadable recipe
-/// of a study that is not paused; `oblique backup --salvage` pauses such a study.
-std::string study_error(const StoredStudy& study) {
-  if (!protocol::is_utf8(study.name)) {  // the name is part of messages, which must be UTF-8
+/// Returns why this version refuses the study, or "". Sets `is_readable` to false if not even its
+/// stored results can be shown. Throws StorageError for an unreadable recipe of a running study;
+/// `oblique backup --salvage` leaves no such study.
+std::string study_error(const StoredStudy& study, bool& is_readable) {
+  is_readable = protocol::is_utf8(study.name);  // the name is part of messages
+  if (!is_readable) {
     return "its name is not UTF-8: rename it with sqlite3 while no server runs";
   }
   try {
@@ -71,7 +73,8 @@ std::string study_error(const StoredStudy& study) {
   } catch (const solver::InputError& reason) {
     return reason.what();
   } catch (const std::runtime_error& reason) {
-    if (study.state == StudyState::kPaused) {
+    if (study.state != StudyState::kRunning) {
+      is_readable = false;
       return fmt::format("its recipe cannot be read: {}; `oblique delete` removes it",
                          reason.what());
     }
@@ -115,8 +118,9 @@ std::vector<StoredStudy> Store::studies() {
     }
     reused.reset();
     const bool is_open = study.completed.size() < study.table.size();
-    const std::string error = study_error(study);
-    if (!error.empty() && (is_open || !protocol::is_utf8(study.name))) {
+    bool is_readable = true;
+    const std::string error = study_error(study, is_readable);
+    if (!error.empty() && (is_open || !is_readable)) {
       skipped_.push_back(fmt::format("study {} (\"{}\") is skipped: {}", study.study_id,
                                      protocol::visible(study.name), error));
       continue;
