@@ -46,8 +46,8 @@ SchemaDifferences compare_schema(sqlite3* database) {
     return std::ranges::count(found.foreign, element.name, &SchemaElement::name) == 1 &&
            std::ranges::count(found.foreign, element) == 1;
   });
-  if (std::ranges::count(found.lacking, "table", &SchemaElement::type) >
-      0) {  // with a table its indices and triggers are missing
+  // The indices and triggers of a missing table are missing, too.
+  if (std::ranges::count(found.lacking, "table", &SchemaElement::type) > 0) {
     std::erase_if(found.lacking, [](const auto& element) { return element.type != "table"; });
   }
   // SQLite makes an index without a statement for each constraint that needs one.

@@ -84,7 +84,7 @@ TEST_F(ControlGroups, LimitMemoryByTheSmallestOfTheProcessGroupAndItsParents) {
   EXPECT_EQ(available_memory_bytes(root_), 500'000'000U);
 }
 
-/// Calls `check` while the affinity mask of this thread has the first `allowed` of its processors.
+/// Calls `check` while this thread may use only the first `allowed` of its processors.
 void with_processors(std::size_t allowed, const std::function<void()>& check) {
   cpu_set_t mask;
   ASSERT_EQ(sched_getaffinity(0, sizeof mask, &mask), 0);
