@@ -46,7 +46,7 @@ std::string read_small_file(const std::string& path, std::string_view what,
   return text;
 }
 
-Descriptor opened_folder_of(const std::string& path) {
+Descriptor open_folder_of(const std::string& path) {
   const std::string folder = std::filesystem::absolute(path).parent_path();
   Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!opened.is_open()) {

@@ -17,7 +17,7 @@ std::string read_small_file(const std::string& path, std::string_view what, std:
 
 /// Opens the folder of `path`, for a lock or a sync: a new name survives a power failure once its
 /// folder is synced. Throws std::runtime_error.
-Descriptor opened_folder_of(const std::string& path);
+Descriptor open_folder_of(const std::string& path);
 
 /// Returns the kind of a file with this `st_mode`, such as "a pipe".
 inline const char* kind_of_file(mode_t mode) {

@@ -176,7 +176,7 @@ void write_new_file(const std::string& path, std::string_view text) {
     ::unlink(path.c_str());
     fail_to("cannot write", path);
   }
-  static_cast<void>(::fsync(opened_folder_of(path).number()));
+  static_cast<void>(::fsync(open_folder_of(path).number()));
 }
 
 /// Throws if the mode of the file or folder contains any of the bits `refused`.
@@ -344,7 +344,7 @@ void change_authorized_keys(const std::string& path,
                             const std::function<void(AuthorizedKeys&)>& change) {
   // If `path` is a symbolic link, replaces its target, to which other links may point.
   const std::string target = std::filesystem::weakly_canonical(path);
-  const Descriptor folder = opened_folder_of(target);
+  const Descriptor folder = open_folder_of(target);
   if (::flock(folder.number(), LOCK_EX) != 0) {
     fail_to("cannot lock the folder of", path);
   }

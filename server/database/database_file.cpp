@@ -224,7 +224,7 @@ void DraftFile::keep_as(const std::string& name) const {
     error = std::error_code(errno, std::generic_category());
   }
   // EINVAL: the file system cannot sync folders
-  if (!error && ::fsync(protocol::opened_folder_of(name).number()) != 0 && errno != EINVAL) {
+  if (!error && ::fsync(protocol::open_folder_of(name).number()) != 0 && errno != EINVAL) {
     error = std::error_code(errno, std::generic_category());
   }
   if (error) {
