@@ -18,9 +18,9 @@ std::span<SolvingSlot> make_shared_slots(std::size_t threads);
 /// ends the child, starts another one: at once, or after a growing pause if several in a row have
 /// solved nothing. Forwards signals to stop. Must be called before any thread starts.
 ///
-/// `hello` contains the random ID of the child, and the child before it. `forwarder` is a socket for
-/// messages to systemd, which accepts them from the parent only. Returns in the child too, with the
-/// result of `work`.
+/// `hello` contains the random ID of the child, and the child before it. `forwarder` is a socket
+/// for messages to systemd, which accepts them from the parent only. Returns in the child too, with
+/// the result of `work`.
 int supervise(protocol::StopSignals& stop, std::span<SolvingSlot> slots,
               const std::function<int(const protocol::WorkerHello& hello, int forwarder)>& work);
 
