@@ -392,16 +392,15 @@ std::optional<Range> range_given(const PlotRequest& request) {
     return std::nullopt;
   }
   const auto colon = text.find(':');
-  const double from = solver::number_of(text.substr(0, colon)).value_or(std::nan(""));
-  const double to =
-      solver::number_of(text.substr(std::min(colon, text.size() - 1) + 1)).value_or(std::nan(""));
-  if (!is_drawable(from) || !is_drawable(to) || counts_as_one({from, to})) {
+  const auto from = solver::number_of(text.substr(0, colon));
+  const auto to = solver::number_of(text.substr(std::min(colon, text.size() - 1) + 1));
+  if (!from || !to || !is_drawable(*from) || !is_drawable(*to) || counts_as_one({*from, *to})) {
     throw InputError(fmt::format(
         "--range {} is not allowed: it must be FROM:TO in SI units with FROM < TO, at most 1e301 "
         "and not closer than 1e-12 of their size",
         text));
   }
-  return Range{from, to};
+  return Range{*from, *to};
 }
 
 std::pair<std::string, std::string> scatter_columns(const PlotRequest& request) {

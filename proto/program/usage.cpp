@@ -86,11 +86,13 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
       error.get_name() == "RequiredError") {
     return "a command is required; the commands are " + joined(commands);
   }
-  const std::string message = error.what();
-  if (const auto at = message.find(": At Most 1 required"); at != std::string::npos) {
-    return message.substr(0, at) + " was given more than once: give it once";
+  for (const auto* option : command.get_options()) {
+    if (option->get_multi_option_policy() == CLI::MultiOptionPolicy::Throw &&
+        option->get_items_expected_max() <= 1 && option->count() > 1) {
+      return option->get_name() + " was given more than once: give it once";
+    }
   }
-  return message;
+  return error.what();
 }
 
 int report_wrong_usage(const std::string& words, const std::string& message) {

@@ -92,7 +92,7 @@ TEST_F(ReaderTest, StatementsThatWriteReachOutsideOrAreWrongAreRefusedWithTheRea
       {"SELECT 1 WHERE 1 > :mu", "a parameter"},
       {"SELECT 1; SELECT 2", "one statement"},
       {"  ", "the statement is empty"},
-      {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "no such column: mux"},
+      {"SELECT count(*) FROM runs WHERE \"mux\" > 0.5", "mux"},
   };
   for (const auto& [sql, reason] : wrong) {
     EXPECT_THAT(refusal_of(sql), HasSubstr(reason)) << sql;
