@@ -74,7 +74,7 @@ TEST(MapCommand, BothSidesOfEveryVertexSolvedAnewHaveTheNamedModes) {
     for (const double side : {-0.5, 0.5}) {
       const double mu = vertex["x"].get<double>() + (is_along_x ? side * width : 0.0);
       const double H_m = vertex["y"].get<double>() + (is_along_x ? 0.0 : side * width);
-      ASSERT_EQ(solved_mode(finger, mu, H_m), vertex[side < 0.0 ? "from" : "to"]) << vertex;
+      ASSERT_EQ(vertex[side < 0.0 ? "from" : "to"], solved_mode(finger, mu, H_m)) << vertex;
     }
   }
 }
