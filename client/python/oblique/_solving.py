@@ -76,7 +76,7 @@ def trace(
 
     >>> import oblique
     >>> contact = oblique.trace(H=1, mu=0.4, e=1)
-    >>> round(float(contact.fn_N.max()), 1), contact.state[0]
+    >>> round(float(contact.fn_N.max()), 1), str(contact.state[0])
     (4909.4, 'sC')
     """
     keys, _ = _keys({"H": H, "mu": mu, "e": e, **model}, preset, lengths, one_for="trace")
