@@ -139,6 +139,7 @@ class Packages(unittest.TestCase):
                               "start oblique-worker.service oblique-worker@lab.service"])
             self.assertFalse((folder / "run/oblique-worker.stopped").exists())
 
+    @counting.full
     def test_lintian_has_no_errors_and_warns_of_nothing(self):
         if not shutil.which("lintian"):
             self.skipTest("lintian is not installed")
@@ -148,6 +149,7 @@ class Packages(unittest.TestCase):
         run("lintian", "--allow-root", "--fail-on", "error,warning", "--suppress-tags",
             "uses-no-compression-for-data-tarball", *PACKAGES.values())
 
+    @counting.full
     def test_packing_again_gives_the_same_bytes(self):
         again = pack(pathlib.Path(FOLDER.name) / "elsewhere")
         self.assertEqual(again.keys(), PACKAGES.keys())
@@ -220,6 +222,7 @@ class AtWork(unittest.TestCase):
         self.assertEqual([file.read_text() for file in kept], [file.name for file in kept])
         self.assertTrue((self.root / "etc/oblique/server.toml").exists())
 
+    @counting.full
     def test_a_downgrade_prints_its_consequences(self):
         self.install(*SERVICES)
         printed = self.install(*(older(service, self.folder) for service in SERVICES))
@@ -227,6 +230,7 @@ class AtWork(unittest.TestCase):
         self.assertIn("then use an older copy", printed)
         self.assertNotIn("is downgraded", self.install(*SERVICES))
 
+    @counting.full
     def test_services_stay_enabled_after_a_removal_but_not_after_a_purge(self):
         self.install(*SERVICES)
         links = [self.enable("oblique-server.service", "oblique-server.service"),
@@ -241,6 +245,7 @@ class AtWork(unittest.TestCase):
         self.assertEqual([link for link in links if link.is_symlink()], [])
         self.assertTrue(other.is_symlink())
 
+    @counting.full
     def test_a_purge_keeps_links_to_a_users_unit(self):
         self.install("oblique-worker")
         ours = self.enable("oblique-worker@.service", "oblique-worker@lab.service")

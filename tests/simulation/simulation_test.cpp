@@ -36,7 +36,7 @@ std::uint64_t seeds(int quick, int all) {
 class SimulationTest : public testing::TestWithParam<std::uint64_t> {};
 
 TEST_P(SimulationTest, EveryPointEndsWithOneRightRowDespiteFaults) {
-  const std::uint64_t count = seeds(40, 250);
+  const std::uint64_t count = seeds(30, 250);
   SimulationSettings settings;
   settings.forgetful_syncs = GetParam() % 2 == 1;
   auto all = simulate_seeds(GetParam() * count + 1, count, settings);
@@ -65,7 +65,7 @@ INSTANTIATE_TEST_SUITE_P(Part, SimulationTest, testing::Range<std::uint64_t>(0, 
 TEST(StormsTest, NoPointFailsBecauseOfLostWorkersIfOneWorkerIsSound) {
   SimulationSettings settings;
   settings.storms = true;
-  const std::uint64_t count = seeds(20, 200);
+  const std::uint64_t count = seeds(10, 200);
   auto all = simulate_seeds(1, count, settings);
   EXPECT_GT(all["worker faults"], 5 * count);
   EXPECT_GT(all["cuts"], 5 * count / 2);

@@ -1,5 +1,6 @@
 // Example programs in deploy/examples that read a database.
 #include <cstdlib>
+#include <ostream>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -38,6 +39,10 @@ struct Example {
   std::string needs;
   double relative_error = 0.0;  ///< allowed error of the printed numbers
 };
+
+void PrintTo(const Example& example, std::ostream* out) {
+  *out << example.needs;
+}
 
 class Examples : public testing::TestWithParam<Example> {};
 

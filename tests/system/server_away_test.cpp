@@ -9,20 +9,25 @@
 
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
-#include "tests/system/many_points.h"
 
 namespace oblique::test {
 namespace {
 
-/// A server with a study of many points and no worker.
+constexpr double kPoints = 10;
+
+/// A server with a study and no worker.
 class ServerAwayTest : public ::testing::Test {
  protected:
   std::vector<std::string> submit_and_watch() const {
-    return many_points("many", {"submit", "--server", server_->client_url(), "--watch"});
+    return {"submit",   "--server", server_->client_url(),
+            "--watch",  "--preset", "paper",
+            "--H",      "1",        "--mu",
+            "0.1:2:10", "--e",      "1",
+            "--name",   "waiting"};
   }
 
   std::vector<std::string> watch() const {
-    return {"watch", "many", "--server", server_->client_url()};
+    return {"watch", "waiting", "--server", server_->client_url()};
   }
 
   static void wait_until_printed(const Process& client, const std::string& words) {
@@ -38,7 +43,7 @@ class ServerAwayTest : public ::testing::Test {
   void start_server_again() { server_ = std::make_unique<Server>(folder_, database_, *server_); }
 
   TemporaryFolder folder_;
-  std::string database_{folder_.file("many.db")};
+  std::string database_{folder_.file("waiting.db")};
   std::unique_ptr<Server> server_ = std::make_unique<Server>(folder_, database_);
 };
 
@@ -57,7 +62,7 @@ TEST_F(ServerAwayTest, WatchingContinuesAfterTheServerIsKilledAndRestarted) {
     wait_until_printed(*client, "answers again");
     EXPECT_EQ(client->wait(), 0) << client->err();
   }
-  EXPECT_EQ(Database(database_).rows(), kManyPoints);
+  EXPECT_EQ(Database(database_).rows(), kPoints);
 }
 
 TEST_F(ServerAwayTest, AServerThatNeverAnsweredIsNotWaitedFor) {
@@ -71,35 +76,35 @@ TEST_F(ServerAwayTest, AServerThatNeverAnsweredIsNotWaitedFor) {
 }
 
 TEST_F(ServerAwayTest, ASignalEndsWatchingWithTheExitCodeOfTheSignal) {
-  for (const bool is_away : {false, true}) {
-    std::vector<std::unique_ptr<Process>> clients;
-    for (const auto& arguments : {submit_and_watch(), watch(), submit_and_watch(), watch()}) {
-      clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
-      // The study must exist before the next client watches it.
-      wait_until("the study is stored", [this] {
-        const std::string count = "SELECT count(*) FROM studies";
-        try {
-          return Database(database_).number(count) == 1.0;
-        } catch (const std::runtime_error&) {
-          return false;  // no tables yet
-        }
-      });
-    }
-    for (const auto& client : clients) {
-      wait_until_printed(*client, "many: 0 of");
-    }
-    if (is_away) {
+  // The first four clients get their signal while the server runs, the others while it is away.
+  std::vector<std::unique_ptr<Process>> clients;
+  for (int i = 0; i < 8; ++i) {
+    const auto arguments = i % 2 == 0 ? submit_and_watch() : watch();
+    clients.push_back(std::make_unique<Process>(folder_, client_program(), arguments));
+    // The study must exist before the next client watches it.
+    wait_until("the study is stored", [this] {
+      const std::string count = "SELECT count(*) FROM studies";
+      try {
+        return Database(database_).number(count) == 1.0;
+      } catch (const std::runtime_error&) {
+        return false;  // no tables yet
+      }
+    });
+  }
+  for (const auto& client : clients) {
+    wait_until_printed(*client, "waiting: 0 of");
+  }
+  for (std::size_t i = 0; i < clients.size(); ++i) {
+    if (i == 4) {
       kill_server();
     }
-    for (std::size_t i = 0; i < clients.size(); ++i) {
-      if (is_away) {
-        wait_until_printed(*clients[i], "no answer from");
-      }
-      const int signal = i < 2 ? SIGINT : SIGTERM;
-      clients[i]->send(signal);
-      EXPECT_EQ(clients[i]->wait(), 128 + signal) << clients[i]->err();
-      EXPECT_NE(clients[i]->err().find("Watching ended"), std::string::npos) << clients[i]->err();
+    if (i >= 4) {
+      wait_until_printed(*clients[i], "no answer from");
     }
+    const int signal = i % 4 < 2 ? SIGINT : SIGTERM;
+    clients[i]->send(signal);
+    EXPECT_EQ(clients[i]->wait(), 128 + signal) << clients[i]->err();
+    EXPECT_NE(clients[i]->err().find("Watching ended"), std::string::npos) << clients[i]->err();
   }
 }
 

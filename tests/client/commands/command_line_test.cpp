@@ -108,7 +108,7 @@ TEST(CommandLine, WarnsOfTheErrorsOfACoarseMeshOnceOnStandardError) {
   for (const auto& words :
        {std::vector<std::string>{"solve"}, {"run"}, {"study", "check", "--no-rate"}}) {
     auto light = words;
-    light.insert(light.end(), {"--rho", "2.7"});
+    light.insert(light.end(), {"--rho", "2.7", "--elements-per-link", "1"});
     EXPECT_THAT(err_of(light),
                 HasSubstr("Note: rho = 2.7 kg/m^3 is outside the usual 100 to 25000 kg/m^3"));
   }

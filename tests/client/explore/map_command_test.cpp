@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/support/amount.h"
 #include "tests/support/database.h"
 #include "tests/support/programs.h"
 #include "worker/solver/model/parameters.h"
@@ -104,14 +105,14 @@ TEST(MapCommand, JsonAndCsvHaveTheSameVerticesAndAPictureIsBesideTheTable) {
   EXPECT_EQ(map["shifts"].size(), map["curves"].size());
 }
 
-TEST(MapCommand, EndedAtTenRandomInstantsItContinuesToTheSameMapToTheBit) {
+TEST(MapCommand, EndedAtRandomInstantsItContinuesToTheSameMapToTheBit) {
   const test::TemporaryFolder whole;
   const auto undisturbed = test::run_oblique(whole, map_words({"--format", "json"}));
   ASSERT_EQ(undisturbed.exit_code, 0) << undisturbed.err;
   const double points = test::Database(whole.file("oblique.db")).rows();
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> part;
-  std::vector<double> kills(10);
+  std::vector<double> kills(static_cast<std::size_t>(test::amount(2, 10)));
   std::generate(kills.begin(), kills.end(), [&] { return part(random) * points; });
   std::sort(kills.begin(), kills.end());
   const test::TemporaryFolder folder;

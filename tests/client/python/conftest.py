@@ -53,6 +53,18 @@ def database(tmp_path_factory):
     return file
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "full: runs only with OBLIQUE_TEST_ALL, which `deploy/test --all` sets")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leaves tests with the marker `full` to `deploy/test --all`."""
+    if "OBLIQUE_TEST_ALL" not in os.environ:
+        left_out = [item for item in items if item.get_closest_marker("full")]
+        items[:] = [item for item in items if item not in left_out]
+        config.hook.pytest_deselected(items=left_out)
+
+
 def pytest_terminal_summary(terminalreporter):
     for report in terminalreporter.stats.get("skipped", []):
         terminalreporter.write_line(f"SKIPPED: {report.nodeid}: {report.longrepr[2]}")

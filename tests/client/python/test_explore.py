@@ -75,7 +75,7 @@ def test_uncertainty_gives_arrays_with_an_entry_for_each_statistic(folder):
 
 def test_a_map_is_that_of_the_program(tmp_path):
     flags = {
-        "x": "mu=0.1:1", "y": "H=0.5:1", "e": 1, "preset": "paper", "cells": 4, "bracket": 1e-3,
+        "x": "mu=0.1:1", "y": "H=0.5:1", "e": 1, "preset": "paper", "cells": 4, "bracket": 1e-2,
         "db": str(tmp_path / "map.db"),
     }  # fmt: skip
     found = oblique.map(**flags)

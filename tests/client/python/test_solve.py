@@ -20,11 +20,11 @@ from conftest import run_oblique, solved_by_program, without_time
     "keys",
     [
         {},
-        {"mu": 1.2, "e": 0.8, "errors": True},
+        {"mu": 1.2, "e": 0.8, "errors": True, "elements_per_link": 2},
         {"preset": "printed", "elements_per_link": 2, "tip_mass": 0.01},
         {"integrator": "generalized-alpha", "elements_per_link": 1},
-        {"lengths": [0.4, 0.5, 0.3]},
-        {"length2": 0.5, "I": "A^2 / (4 * pi)"},
+        {"lengths": [0.4, 0.5, 0.3], "elements_per_link": 2},
+        {"length2": 0.5, "I": "A^2 / (4 * pi)", "elements_per_link": 2},
     ],
 )
 def test_a_point_has_all_fields_and_the_bits_of_solve_json(keys):
@@ -41,7 +41,7 @@ def test_a_point_has_all_fields_and_the_bits_of_solve_json(keys):
 
 def test_a_value_probably_in_another_unit_is_warned_of_once_per_key():
     with pytest.warns(UserWarning) as warned:
-        oblique.solve_many(1, 0.4, 1, rho=[2.7, 2700], tip_mass=20)
+        oblique.solve_many(1, 0.4, 1, rho=[2.7, 2700], tip_mass=20, elements_per_link=1)
     assert [str(one.message) for one in warned] == [
         "rho = 2.7 kg/m^3 is outside the usual 100 to 25000 kg/m^3; 2700?",
         "tip_mass = 20 kg is outside the usual 1e-6 to 10 kg; 0.02?",

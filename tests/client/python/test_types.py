@@ -35,6 +35,7 @@ def test_a_program_that_uses_the_module_is_typed_strictly(tmp_path):
     strictly_typed(tmp_path, str(tmp_path / "use.py"))
 
 
+@pytest.mark.full
 def test_the_module_itself_is_typed_strictly(tmp_path):
     # Debian 12's pandas has no type annotations.
     strictly_typed(tmp_path, "--ignore-missing-imports", "-p", "oblique")

@@ -75,7 +75,7 @@ test("Escape clears the selection, and Shift makes dragging select instead of zo
     "1?pic=histogram&x=mu": `mu >= ${range}`,
     "2?x=mu&y=H&z=": `mu >= ${range} AND H >= ${range}`,
   };
-  for (const [view, pattern] of Object.entries(conditions)) {
+  for (const [view, pattern] of web.casesOf(Object.entries(conditions), 2)) {
     const selector = web.pictureIn(view);
     const page = await web.study(`#/study/${view}`);
     await page.keyboard.down("Shift");
@@ -107,27 +107,31 @@ test("lines show a selection made in another picture, and keys read their values
   await page.close();
 });
 
-test("few points are drawn one by one and can be clicked; many are grouped in bins, and the page says so", async () => {
-  const page = await web.study(`#/study/${web.studies.scattered}?x=mu&y=fn_peak_N&z=H`);
-  await web.facts(page, /^300 points, drawn one by one/);
-  const id = web.studies.scattered;
-  const [[lowest, mu]] = await web.rowsOf(page, id, {
-    select: "point,mu",
-    order: "fn_peak_N",
-    limit: 1,
-  });
-  const [[least, most]] = await web.rowsOf(page, id, { select: "min(mu),max(mu)" });
-  const box = await (await page.$(web.mapCanvas)).boundingBox();
-  const x = box.x + 64 + ((mu - least) / (most - least)) * (box.width - 78);
-  await page.mouse.click(x, box.y + box.height - 47);
-  await web.shows(page, ".choice a", new RegExp(`Open point ${lowest}$`));
-  await page.close();
-  const many = await web.study(`#/study/${web.studies.many}?x=mu&y=fn_peak_N&z=H`);
-  await web.facts(
-    many,
-    /^20\u202f100 points in [\d\u202f]+ bins\. More than 20\u202f000 points are grouped in bins/,
-  );
-  await web.write(many, web.whereField, "mu < 0.5");
-  await web.facts(many, /drawn one by one/);
-  await many.close();
-});
+test(
+  "few points are drawn one by one and can be clicked; many are grouped in bins, and the page says so",
+  web.inFull,
+  async () => {
+    const page = await web.study(`#/study/${web.studies.scattered}?x=mu&y=fn_peak_N&z=H`);
+    await web.facts(page, /^300 points, drawn one by one/);
+    const id = web.studies.scattered;
+    const [[lowest, mu]] = await web.rowsOf(page, id, {
+      select: "point,mu",
+      order: "fn_peak_N",
+      limit: 1,
+    });
+    const [[least, most]] = await web.rowsOf(page, id, { select: "min(mu),max(mu)" });
+    const box = await (await page.$(web.mapCanvas)).boundingBox();
+    const x = box.x + 64 + ((mu - least) / (most - least)) * (box.width - 78);
+    await page.mouse.click(x, box.y + box.height - 47);
+    await web.shows(page, ".choice a", new RegExp(`Open point ${lowest}$`));
+    await page.close();
+    const many = await web.study(`#/study/${web.studies.many}?x=mu&y=fn_peak_N&z=H`);
+    await web.facts(
+      many,
+      /^20\u202f100 points in [\d\u202f]+ bins\. More than 20\u202f000 points are grouped in bins/,
+    );
+    await web.write(many, web.whereField, "mu < 0.5");
+    await web.facts(many, /drawn one by one/);
+    await many.close();
+  },
+);

@@ -8,10 +8,13 @@ import * as web from "./setup.mjs";
 /** Address of each view, and selector of an element that exists once the view is drawn. */
 const views = {
   overview: ["#/", "tbody tr"],
+  selected: ["#/study/1?at=e@2&where=mu>0.3&mark=H>0.8", "[data-selected] .gaps li"],
+  start: ["#/new", "form"],
+  point: ["#/study/1/point/100", ".uplot"],
+  lines: ["#/study/1?pic=lines&y=e&mark=H>0.8", "[data-selected] .uplot"],
+  nothing: ["#/study/999", "[role=alert]"],
   map: ["#/study/1?cell=3", ".choice a"],
   modes: ["#/study/1?pic=map&z=mode&at=e@2", ".categories li"],
-  selected: ["#/study/1?at=e@2&where=mu>0.3&mark=H>0.8", "[data-selected] .gaps li"],
-  lines: ["#/study/1?pic=lines&y=e&mark=H>0.8", "[data-selected] .uplot"],
   medians: [`#/study/${web.studies.scattered}?pic=lines&x=mu`, ".uplot"],
   points: [`#/study/${web.studies.scattered}?x=mu&y=fn_peak_N&z=major_mode`, ".categories li"],
   bins: [`#/study/${web.studies.many}?x=mu&y=fn_peak_N&z=H`, ".bar"],
@@ -21,17 +24,16 @@ const views = {
   ],
   one: [`#/study/${web.studies.one}`, ".files"],
   wrong: ["#/study/1?where=muu>1", "#said-where:not(:empty)"],
-  point: ["#/study/1/point/100", ".uplot"],
-  start: ["#/new", "form"],
-  nothing: ["#/study/999", "[role=alert]"],
 };
 
 test("axe-core finds no fault in any view, light or dark, and nothing is wider than a window of 400 or 1400 pixels", async () => {
   const folder = process.env.OBLIQUE_SCREENSHOTS;
   if (folder) mkdirSync(folder, { recursive: true });
   const faults = [];
-  for (const [name, [view, drawn]] of Object.entries(views)) {
-    for (const width of [1400, 400]) {
+  for (const [i, [name, [view, drawn]]] of web.casesOf(Object.entries(views), 6).entries()) {
+    // Each view has one look by default, in turn, and both looks with --all.
+    const widths = i % 2 === 0 ? [1400, 400] : [400, 1400];
+    for (const width of web.casesOf(widths, 1)) {
       const scheme = width > 400 ? "light" : "dark";
       const page = await web.browser.open(view, { width, scheme, expected: /status of 40[04]/ });
       await page.waitForSelector(drawn);

@@ -86,7 +86,7 @@ test("the plots of a point are saved as one PNG and its time histories as CSV", 
   await page.close();
 });
 
-test("a refused trace is requested again, and the page shows the reason", async () => {
+test("a refused trace is requested again, and the page shows the reason", web.inFull, async () => {
   const page = await web.browser.open("#/study/1/point/7", {
     isHurried: true,
     early: () => {

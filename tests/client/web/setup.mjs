@@ -22,6 +22,11 @@ export const markField = ".marks input";
  */
 export const studies = { grid: 1, scattered: 2, many: 3, one: 4 };
 
+/** Options of a test that only `deploy/test --all` runs. */
+export const inFull = { skip: process.env.OBLIQUE_TEST_ALL ? false : "runs with --all" };
+/** Returns the first `count` cases, or all cases in `deploy/test --all`. */
+export const casesOf = (all, count) => (process.env.OBLIQUE_TEST_ALL ? all : all.slice(0, count));
+
 before(async () => {
   copyFileSync(process.env.OBLIQUE_PAGE_DB, server.database);
   await server.start();

@@ -51,16 +51,20 @@ test("keys move over a map and zoom it, a live region announces its values, Ente
   await page.close();
 });
 
-test("pickers list the columns that vary, then the main outputs, each once", async () => {
-  const page = await web.study(`#/study/${web.studies.scattered}`);
-  const options = await optionsOf(page, "colour");
-  const first = "none,H [m],mu,e,fn_peak_N,ft_peak_N,duration_s [µs],slide_m [mm]".split(",");
-  assert.deepEqual(options.slice(0, first.length), first);
-  assert.deepEqual([...new Set(options)], options);
-  for (const absent of ["attempt", "k", "fn_peak_error"])
-    assert.ok(!options.includes(absent), absent);
-  await page.close();
-});
+test(
+  "pickers list the columns that vary, then the main outputs, each once",
+  web.inFull,
+  async () => {
+    const page = await web.study(`#/study/${web.studies.scattered}`);
+    const options = await optionsOf(page, "colour");
+    const first = "none,H [m],mu,e,fn_peak_N,ft_peak_N,duration_s [µs],slide_m [mm]".split(",");
+    assert.deepEqual(options.slice(0, first.length), first);
+    assert.deepEqual([...new Set(options)], options);
+    for (const absent of ["attempt", "k", "fn_peak_error"])
+      assert.ok(!options.includes(absent), absent);
+    await page.close();
+  },
+);
 
 test("a study shows its axes with their ranges, its mesh with a warning if coarse, and its model", async () => {
   const page = await web.study("#/study/1");
@@ -92,28 +96,32 @@ test("tables, maps and lines have the units of the tables of oblique, and the ta
   await page.close();
 });
 
-test("a mode keeps its colour while the page is open: when zoomed, for another slider value, and as points", async () => {
-  const page = await web.study("#/study/1?pic=map&z=major_mode&x=mu&y=H&at=e@2");
-  const looks = () =>
-    page.$$eval(".categories li", (all) => {
-      const looks = all.map((one) => [one.childNodes[1].data, one.firstChild.toDataURL()]);
-      return looks.filter(([text]) => !text.includes("others"));
-    });
-  const known = new Map(await looks());
-  for (const view of [
-    "map&x=mu&y=H&at=e@0",
-    "map&x=mu&y=H&at=e@2&x0=6&x1=11&y0=3&y1=6",
-    "scatter&x=mu&y=H",
-  ]) {
-    const before = await web.textOf(page, ".facts");
-    await web.goTo(page, `#/study/1?z=major_mode&pic=${view}`);
-    await web.until(page, (old) => document.querySelector(".facts").textContent !== old, before);
-    const shared = (await looks()).filter(([text]) => known.has(text));
-    assert.ok(shared.length > 1, view);
-    for (const [text, look] of shared) assert.ok(known.get(text) === look, `${view}: ${text}`);
-  }
-  await page.close();
-});
+test(
+  "a mode keeps its colour while the page is open: when zoomed, for another slider value, and as points",
+  web.inFull,
+  async () => {
+    const page = await web.study("#/study/1?pic=map&z=major_mode&x=mu&y=H&at=e@2");
+    const looks = () =>
+      page.$$eval(".categories li", (all) => {
+        const looks = all.map((one) => [one.childNodes[1].data, one.firstChild.toDataURL()]);
+        return looks.filter(([text]) => !text.includes("others"));
+      });
+    const known = new Map(await looks());
+    for (const view of [
+      "map&x=mu&y=H&at=e@0",
+      "map&x=mu&y=H&at=e@2&x0=6&x1=11&y0=3&y1=6",
+      "scatter&x=mu&y=H",
+    ]) {
+      const before = await web.textOf(page, ".facts");
+      await web.goTo(page, `#/study/1?z=major_mode&pic=${view}`);
+      await web.until(page, (old) => document.querySelector(".facts").textContent !== old, before);
+      const shared = (await looks()).filter(([text]) => known.has(text));
+      assert.ok(shared.length > 1, view);
+      for (const [text, look] of shared) assert.ok(known.get(text) === look, `${view}: ${text}`);
+    }
+    await page.close();
+  },
+);
 
 test("a sample is drawn as points, its lines are medians and quartiles, and its histogram shows an output and begins at 0", async () => {
   const page = await web.study(`#/study/${web.studies.scattered}`, {
@@ -147,7 +155,7 @@ test("zooming by mouse changes address and command, Back undoes it, also on line
     "2?pic=histogram&x=closure&xlog=1": "--range [\\de.-]+:[\\de.-]+ --log-x",
     "2?pic=scatter&x=mu&y=fn_peak_N&z=": "--scatter mu,fn_peak_N --where",
   };
-  for (const [view, command] of Object.entries(commands)) {
+  for (const [view, command] of web.casesOf(Object.entries(commands), 2)) {
     const selector = web.pictureIn(view);
     const page = await web.study(`#/study/${view}`);
     await web.drag(page, selector, [0.2, 0.2], [0.8, 0.8]);
@@ -163,97 +171,38 @@ test("zooming by mouse changes address and command, Back undoes it, also on line
   }
 });
 
-test("a slider shows other values and writes the address only a few times however fast it moves", async () => {
-  const page = await web.study("#/study/1?pic=map&z=mode&x=mu&y=H&at=e@2");
-  assert.match(
-    await plotCommand(page),
-    /^oblique plot friction --map mode --x mu --y H --at e=1 --out/,
-  );
-  const [times, address] = await page.evaluate(() => {
-    const real = history.replaceState.bind(history);
-    let written = 0;
-    history.replaceState = (...given) => {
-      ++written;
-      real(...given);
-    };
-    const slider = document.querySelector(".sliders input");
-    for (let i = 0; i <= 300; ++i) {
-      slider.value = String(i % 3);
-      slider.dispatchEvent(new Event("input"));
-    }
-    document.querySelector("h2.name").click(); // a click updates the address
-    return [written, location.hash];
-  });
-  assert.ok(times <= 3, `${times} times`);
-  assert.match(address, /at=e%400/);
-  await web.facts(page, /e = 0\.6/);
-  await page.close();
-});
-
-test("rows are paged and sorted, also by keyboard, and the address contains the page", async () => {
-  const page = await web.study("#/study/1");
-  await web.showsRowCount(page, /^1 to 25 of 252 rows\.$/);
-  await web.press(page, "Next");
-  await web.showsRowCount(page, /^26 to 50 of 252 rows\.$/);
-  await web.until(page, () => location.hash.includes("page=2"));
-  await web.write(page, web.whereField, "mu > 1"); // a new filter returns to the first page
-  await web.showsRowCount(page, /^1 to 25 of 126 rows/);
-  await page.evaluate(() =>
-    [...document.querySelectorAll("th button")].find((one) => one.textContent === "mu").focus(),
-  );
-  for (const order of ["ascending", "descending"]) {
-    await page.keyboard.press("Enter");
-    await web.shows(page, `.rows th[aria-sort=${order}]`, /^mu/);
-    assert.match(await page.evaluate(() => document.activeElement.textContent), /^mu/);
-  }
-  await web.showsRowCount(page, /^1 to 25/);
-  await page.close();
-});
-
-test("all modules are preloaded, and no others", async () => {
-  const page = await web.study("#/study/1");
-  const [preloaded, needed] = await page.evaluate(async () => {
-    const path = (address) => new URL(address, location.href).pathname;
-    const links = [...document.querySelectorAll("link[rel=modulepreload]")];
-    const found = new Set(["/main.js"]);
-    // The loop also visits the modules that it adds to `found`.
-    for (const module of found) {
-      const text = await (await fetch(module)).text();
-      for (const [, wanted] of text.matchAll(/ from "([^"]+)";$/gm)) {
-        found.add(new URL(wanted, `${location.origin}${module}`).pathname);
+test(
+  "a slider shows other values and writes the address only a few times however fast it moves",
+  web.inFull,
+  async () => {
+    const page = await web.study("#/study/1?pic=map&z=mode&x=mu&y=H&at=e@2");
+    assert.match(
+      await plotCommand(page),
+      /^oblique plot friction --map mode --x mu --y H --at e=1 --out/,
+    );
+    const [times, address] = await page.evaluate(() => {
+      const real = history.replaceState.bind(history);
+      let written = 0;
+      history.replaceState = (...given) => {
+        ++written;
+        real(...given);
+      };
+      const slider = document.querySelector(".sliders input");
+      for (let i = 0; i <= 300; ++i) {
+        slider.value = String(i % 3);
+        slider.dispatchEvent(new Event("input"));
       }
-    }
-    const named = [...links.map((one) => path(one.href)), "/main.js"];
-    return [named.sort(), [...found].sort()];
-  });
-  assert.deepEqual(preloaded, needed);
-  await page.close();
-});
+      document.querySelector("h2.name").click(); // a click updates the address
+      return [written, location.hash];
+    });
+    assert.ok(times <= 3, `${times} times`);
+    assert.match(address, /at=e%400/);
+    await web.facts(page, /e = 0\.6/);
+    await page.close();
+  },
+);
 
-test("axes of any range have several ticks with different, short texts", async () => {
-  const page = await web.study("#/study/1");
-  const wrong = await page.evaluate(async () => {
-    const { baseOf, scale, ticks, tickText } = await import("./lib/scale.js");
-    const found = [];
-    for (const from of [1e-280, 3e-14, 0.4, 1, 6e10, 1e200]) {
-      for (const share of [2e-12, 1e-10, 1e-8, 1e-6, 1e-3, 0.38, 2.3, 11, 450, 1e40]) {
-        for (const isLog of [false, true]) {
-          const to = from * (1 + share);
-          const base = baseOf(from, to);
-          const texts = ticks(scale(from, to, isLog), 6).map((value) => tickText(value, base));
-          const isShort = texts.every((text) => text.length <= 11);
-          if (new Set(texts).size < Math.max(texts.length, 2) || !isShort)
-            found.push({ from, to, isLog, texts });
-        }
-      }
-    }
-    return found;
-  });
-  assert.deepEqual(wrong, []);
-  await page.close();
-});
-
-test("unsuitable addresses show the default view", async () => {
+test("unsuitable addresses show the default view", web.inFull, async () => {
   const page = await web.browser.open("#/");
   for (const [view, picture] of [
     ["1?pic=map&block=99", "map"],
@@ -274,118 +223,81 @@ test("unsuitable addresses show the default view", async () => {
   await page.close();
 });
 
-test("a map shows one block of a study and says so, and another block can be chosen", async () => {
-  const page = await web.browser.open("#/");
-  const axes = [
-    { key: "H", values: [0.5, 1] },
-    { key: "mu", values: [0.5, 1] },
-    { key: "e", values: [1] },
-  ];
-  const recipe = { blocks: [{ axes: [{ key: "k", values: [1e7] }, ...axes] }, { axes }] };
-  const body = { name: "blocks", model: { preset: "paper" }, recipe };
-  const { id } = await web.api(page, "/api/studies", body);
-  await web.goTo(page, `#/study/${id}?pic=map&block=0`);
-  await web.facts(page, /Block 1 of 2; 4 points in others\./);
-  assert.match(await plotCommand(page), /--map fn_peak_N --x mu --y H --block 1 /);
-  await page.$$eval(".controls label", (all) => {
-    const select = all.find((one) => one.textContent.startsWith("block")).querySelector("select");
-    select.value = "1";
-    select.dispatchEvent(new Event("change"));
-  });
-  await web.facts(page, /Block 2 of 2/);
-  await page.close();
-});
-
-test("the colour scale spans from a typed end, in the shown unit, to the other end of the data", async () => {
-  const page = await web.study("#/study/1?z=slide_m&from=0.0002");
-  assert.match(await plotCommand(page), /--range 0\.0002:0\.00\d+/);
-  const from = "input[inputmode=decimal]";
-  assert.equal(await page.$eval(from, (one) => one.value), "0.2");
-  await web.write(page, from, "0.5");
-  await web.shows(page, ".commands code", /--range 0\.0005:/);
-  await web.write(page, from, "abc");
-  assert.equal(await page.$eval(from, (one) => one.getAttribute("aria-invalid")), "true");
-  await page.close();
-});
-
-test("a study with failed points shows their number and the reason, and lists them in its table", async () => {
-  const page = await web.browser.open("#/");
-  const axes = { H: [1.15, 1.19, 3], mu: [0.5, 1, 2], e: [0.9, 1, 2] };
-  const id = await web.submit(page, "too far", axes);
-  await web.goTo(page, `#/study/${id}`); // the tip falls at most 1.179 m
-  const why = /^Point 8 failed: H = 1\.19 m is not allowed.* 1\.179\d* m.*Show all 4$/;
-  await web.shows(page, ".failure", why);
-  await page.click(".failure a");
-  await web.showsRowCount(page, /^1 to 4 of 4 rows/);
-  assert.equal(await web.fieldOf(page, "where"), "error IS NOT NULL");
-  assert.match(await web.textOf(page, ".rows thead"), /statuserror/);
-  await page.close();
-});
-
-test("a server that does not answer is reported, and requests to it are repeated", async () => {
-  const page = await web.study("#/study/1", {
-    isHurried: true,
-    expected: /ERR_INTERNET_DISCONNECTED/,
-  });
-  await page.setOfflineMode(true);
-  await web.slideTo(page, ".sliders input", 2);
-  await web.shows(page, "p.said", /^The server does not answer\. The last answer is shown\.$/);
-  await web.goTo(page, "#/study/1/point/3");
-  await web.shows(page, "main [role=alert]", /^The server does not answer\.$/);
-  await page.evaluate(() => history.back());
-  await web.until(page, () => location.hash.startsWith("#/study/1?"));
-  await page.setOfflineMode(false);
-  await web.facts(page, /e = 1/);
-  await web.until(page, () => document.querySelector("p.said").textContent === "");
-  await page.close();
-});
-
-test("an outdated picture does not delay the next, and a large map appears coarse first", async () => {
-  const page = await web.study("#/study/1?pic=map&z=fn_peak_N&x=mu&y=H", {
-    early: () => {
-      const real = window.fetch;
-      window.sides = [];
-      window.fetch = (what, how) => {
-        if (what.includes("/slice?")) window.sides.push(new URLSearchParams(what).get("nx"));
-        if (!what.includes("z=slide_m")) return real(what, how);
-        window.isWaiting = true;
-        return new Promise((_, reject) =>
-          how.signal.addEventListener("abort", () => reject(how.signal.reason)),
-        );
-      };
-    },
-  });
-  await web.goTo(page, "#/study/1?pic=map&z=slide_m&x=mu&y=H");
-  await web.until(page, () => window.isWaiting);
-  await web.goTo(page, "#/study/1?pic=map&z=mode&x=mu&y=H");
-  await page.waitForSelector(".categories");
-  const id = await web.submit(page, "large", {
-    H: [0.5, 1.1, 200],
-    mu: [0.1, 2, 200],
-    e: [0.8, 0.8, 1],
-  });
-  await web.api(page, `/api/studies/${id}/pause`, {});
-  await page.evaluate(() => (window.sides = []));
-  await web.goTo(page, `#/study/${id}?pic=map&x=mu&y=H`);
-  await web.facts(page, /200 × 200/);
-  assert.deepEqual(await page.evaluate(() => window.sides.slice(0, 2)), ["96", "256"]);
-  await web.api(page, `/api/studies/${id}/cancel`, {});
-  await page.close();
-});
-
-test("ticks of infinite, tiny and huge ranges are a few round values", async () => {
-  const page = await web.browser.open("#/");
-  const shown = await page.evaluate(async () => {
-    const { scale, ticks } = await import("/lib/scale.js");
-    const ranges = [
-      [0.01, 10, true],
-      [3, 3 + 1e-15],
-      [1, Infinity],
-      [0, Number.MAX_VALUE],
+test(
+  "a map shows one block of a study and says so, and another block can be chosen",
+  web.inFull,
+  async () => {
+    const page = await web.browser.open("#/");
+    const axes = [
+      { key: "H", values: [0.5, 1] },
+      { key: "mu", values: [0.5, 1] },
+      { key: "e", values: [1] },
     ];
-    return ranges.map((ends) => ticks(scale(...ends), 6).join());
-  });
-  const expected = ["0.01,0.03,0.1,0.3,1,3,10", "3", "1", "0,5e+307,1e+308,1.5e+308"];
-  assert.deepEqual(shown, expected);
-  await page.close();
-});
+    const recipe = { blocks: [{ axes: [{ key: "k", values: [1e7] }, ...axes] }, { axes }] };
+    const body = { name: "blocks", model: { preset: "paper" }, recipe };
+    const { id } = await web.api(page, "/api/studies", body);
+    await web.goTo(page, `#/study/${id}?pic=map&block=0`);
+    await web.facts(page, /Block 1 of 2; 4 points in others\./);
+    assert.match(await plotCommand(page), /--map fn_peak_N --x mu --y H --block 1 /);
+    await page.$$eval(".controls label", (all) => {
+      const select = all.find((one) => one.textContent.startsWith("block")).querySelector("select");
+      select.value = "1";
+      select.dispatchEvent(new Event("change"));
+    });
+    await web.facts(page, /Block 2 of 2/);
+    await page.close();
+  },
+);
+
+test(
+  "the colour scale spans from a typed end, in the shown unit, to the other end of the data",
+  web.inFull,
+  async () => {
+    const page = await web.study("#/study/1?z=slide_m&from=0.0002");
+    assert.match(await plotCommand(page), /--range 0\.0002:0\.00\d+/);
+    const from = "input[inputmode=decimal]";
+    assert.equal(await page.$eval(from, (one) => one.value), "0.2");
+    await web.write(page, from, "0.5");
+    await web.shows(page, ".commands code", /--range 0\.0005:/);
+    await web.write(page, from, "abc");
+    assert.equal(await page.$eval(from, (one) => one.getAttribute("aria-invalid")), "true");
+    await page.close();
+  },
+);
+
+test(
+  "an outdated picture does not delay the next, and a large map appears coarse first",
+  web.inFull,
+  async () => {
+    const page = await web.study("#/study/1?pic=map&z=fn_peak_N&x=mu&y=H", {
+      early: () => {
+        const real = window.fetch;
+        window.sides = [];
+        window.fetch = (what, how) => {
+          if (what.includes("/slice?")) window.sides.push(new URLSearchParams(what).get("nx"));
+          if (!what.includes("z=slide_m")) return real(what, how);
+          window.isWaiting = true;
+          return new Promise((_, reject) =>
+            how.signal.addEventListener("abort", () => reject(how.signal.reason)),
+          );
+        };
+      },
+    });
+    await web.goTo(page, "#/study/1?pic=map&z=slide_m&x=mu&y=H");
+    await web.until(page, () => window.isWaiting);
+    await web.goTo(page, "#/study/1?pic=map&z=mode&x=mu&y=H");
+    await page.waitForSelector(".categories");
+    const id = await web.submit(page, "large", {
+      H: [0.5, 1.1, 200],
+      mu: [0.1, 2, 200],
+      e: [0.8, 0.8, 1],
+    });
+    await web.api(page, `/api/studies/${id}/pause`, {});
+    await page.evaluate(() => (window.sides = []));
+    await web.goTo(page, `#/study/${id}?pic=map&x=mu&y=H`);
+    await web.facts(page, /200 × 200/);
+    assert.deepEqual(await page.evaluate(() => window.sides.slice(0, 2)), ["96", "256"]);
+    await web.api(page, `/api/studies/${id}/cancel`, {});
+    await page.close();
+  },
+);
