@@ -126,7 +126,7 @@ StatementHandle prepare_query(sqlite3* database, const std::string& sql) {
   StatementHandle statement(raw, &sqlite3_finalize);
   const int primary = static_cast<int>(static_cast<unsigned>(code) & 0xffU);
   const std::string reason = code == SQLITE_OK ? "" : sqlite3_errmsg(database);
-  if (primary == SQLITE_AUTH) {
+  if (primary == SQLITE_AUTH || reason.starts_with("cannot modify ")) {
     throw StatementError(fmt::format("{}: {}", kOnlyReads, reason));
   }
   if (primary == SQLITE_ERROR) {

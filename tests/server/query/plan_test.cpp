@@ -350,7 +350,7 @@ TEST_F(PlanTest, ErrorsHaveTheFlagAndTheNearestName) {
       {question("peaks.cnt"), "--select", "`peaks.count`"},
       {question("stik_total_s"), "`stick_total_s`", "oblique columns"},
       {question("count(*)", "\"mux\" > 0.5"), "did you mean `mu`", "write texts in single quotes"},
-      {question("mu", "major_mode = \"SC\""), "--where", "SQL expressions are allowed"},
+      {question("mu", "major_mode = \"SC\""), "--where \"major_mode", "SC"},
       {question("mu", "", "", "\"mux\""), "--order \"\"mux\"\"", ""},
       {question("count(*)", "", "\"mux\""), "--group \"\"mux\"\"", ""},
       {question("mu FROM runs --"), "--select", ""},
