@@ -86,11 +86,12 @@ std::string parse_error_message(const CLI::App& app, const CLI::App& command,
       error.get_name() == "RequiredError") {
     return "a command is required; the commands are " + joined(commands);
   }
-  for (const auto* option : command.get_options()) {
-    if (error.get_name() == "ArgumentMismatch" &&
-        option->get_multi_option_policy() == CLI::MultiOptionPolicy::Throw &&
-        option->get_items_expected_max() <= 1 && option->count() > 1) {
-      return option->get_name() + " was given more than once: give it once";
+  if (error.get_name() == "ArgumentMismatch") {
+    for (const auto* option : command.get_options()) {
+      if (option->get_multi_option_policy() == CLI::MultiOptionPolicy::Throw &&
+          option->get_items_expected_max() <= 1 && option->count() > 1) {
+        return option->get_name() + " was given more than once: give it once";
+      }
     }
   }
   return error.what();

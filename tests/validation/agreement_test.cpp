@@ -177,8 +177,8 @@ std::vector<Point> grid() {
   return points;
 }
 
-/// Returns each fifth contact of the grid, or all of them in `deploy/test --all`. Each fifth
-/// contacts have all values of H, mu and e*.
+/// Returns each fifth contact of the grid, or all of them in `deploy/test --all`. Each
+/// fifth contact is enough to have all values of H, mu and e*.
 std::vector<Point> sample_of_grid() {
   const auto all = grid();
   std::vector<Point> points;

@@ -113,8 +113,8 @@ TEST_F(LeavingProgramTest, AWorkerThatNeverReachedItsServerExitsWithOneAndNamesT
 }
 
 TEST_F(LeavingProgramTest, AWorkerReportsOnceThatNoServerAnswers) {
-  Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "4"});
-  // The first attempt to connect takes 3 s. The idle limit of 4 s ends during the second attempt.
+  Worker refused(folder_, "tcp://127.0.0.1:1", {"--idle-exit", "5"});
+  // The first attempt to connect takes 3 s. The idle limit of 5 s ends during the second attempt.
   EXPECT_EQ(refused.wait(), 1);
   const std::string output = refused.err();
   EXPECT_NE(output.find("no server answers at tcp://127.0.0.1:1"), std::string::npos) << output;
